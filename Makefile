@@ -1,0 +1,54 @@
+# `make run` and `make test`: each sets up all that it needs, then does its one job.
+
+CONFIG ?= config/config.yaml
+PYTHON ?= python3
+
+VENV := .venv
+STAMP := $(VENV)/requirements.sha256
+GMSH_LIBRARIES := libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 libgomp1
+CAN_INSTALL := [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null
+APT_INSTALL := apt-get update && apt-get install -y --no-install-recommends
+
+.PHONY: run test environment gmsh-libraries clean-environment
+
+run: environment
+	$(VENV)/bin/snakemake --configfile $(CONFIG) -- all
+
+test: environment
+	$(VENV)/bin/python -m pytest
+
+# Made anew when it is missing, or when requirements.txt is not the one that it was made from.
+environment:
+	@{ sha256sum --check --status $(STAMP) && $(VENV)/bin/python -c ''; } 2>/dev/null \
+		|| $(MAKE) --no-print-directory $(VENV)/new
+	@$(MAKE) --no-print-directory gmsh-libraries
+
+.PHONY: $(VENV)/new
+$(VENV)/new:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+		echo "Python 3.11 or newer is needed, and $(PYTHON) is not: make PYTHON=/path/to/python3.11" >&2; \
+		exit 1; }
+	@rm -rf $(VENV)
+	@$(PYTHON) -m venv $(VENV) >/dev/null 2>&1 || { \
+		if $(CAN_INSTALL); then { $(APT_INSTALL) python3-venv; } >/dev/null; fi; \
+		$(PYTHON) -m venv $(VENV); } || { \
+		echo "$(PYTHON) makes no virtual environment. On Debian or Ubuntu that comes by:" >&2; \
+		echo "  sudo sh -c '$(APT_INSTALL) python3-venv'" >&2; \
+		exit 1; }
+	$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r requirements.txt
+	@sha256sum requirements.txt > $(STAMP)
+
+# gmsh's wheel needs X and GL libraries of the system, which no wheel brings.
+gmsh-libraries:
+	@$(VENV)/bin/python -c 'import gmsh' 2>/dev/null && exit 0; \
+	if $(CAN_INSTALL); then \
+		echo "gmsh lacks system libraries; installing $(GMSH_LIBRARIES)"; \
+		{ $(APT_INSTALL) $(GMSH_LIBRARIES); } >/dev/null; \
+	fi; \
+	$(VENV)/bin/python -c 'import gmsh' || { \
+		echo "gmsh does not load. Its system libraries come, on Debian or Ubuntu, by:" >&2; \
+		echo "  sudo sh -c '$(APT_INSTALL) $(GMSH_LIBRARIES)'" >&2; \
+		exit 1; }
+
+clean-environment:
+	rm -rf $(VENV)
