@@ -1,0 +1,69 @@
+"""Random five-neighbour scenes, and the volume fraction that a scene stands for."""
+
+import numpy as np
+
+NEIGHBOURS = 5
+
+LAWS = ("uniform", "ball")
+"""Radial laws: radii uniform between contact and the fifth distance (the law that reproduces the
+paper's statistics), or points uniform in the ball (a dilute random suspension)."""
+
+_MOST_DRAWS = 10_000
+
+
+def volume_fraction(d5):
+    """phi = 15 V_p / (4 pi d_5^3), d5 [d_p] the distance of the fifth neighbour (paper, Eq. 6)."""
+    return 15.0 / (24.0 * np.asarray(d5, dtype=float) ** 3)
+
+
+def fifth_distance(phi):
+    """Distance [d_p] of the fifth neighbour at volume fraction phi: `volume_fraction` inverted."""
+    return np.cbrt(15.0 / (24.0 * np.asarray(phi, dtype=float)))
+
+
+def random_scene(seed: int, law: str, number: int, phi_range) -> tuple[np.ndarray, float]:
+    """Five neighbours (5, 3) [d_p], nearest first, around a sphere at the origin, and their phi.
+
+    log(phi) is uniform over phi_range; the fifth neighbour lies at `fifth_distance(phi)`, the
+    other four as the radial law says; directions are isotropic. A neighbour that overlaps an
+    earlier one is drawn again. The random stream hangs on (seed, law, number) alone.
+
+    Raises ValueError if the law is unknown or the range cannot hold five neighbours.
+    """
+    if law not in LAWS:
+        raise ValueError(f"radial law {law!r}: allowed are {', '.join(LAWS)}")
+    low, high = phi_range
+    # Five neighbours need room: at d_5 = 2 d_p a random placement without overlap is still quick.
+    densest = float(volume_fraction(2.0))
+    if not 0.0 < low <= high <= densest:
+        raise ValueError(
+            f"phi range {low} to {high}: allowed are 0 < lowest <= highest <= {densest:.4g}"
+        )
+    rng = np.random.default_rng([seed, LAWS.index(law), number])
+    phi = float(np.exp(rng.uniform(np.log(low), np.log(high))))
+    d5 = float(fifth_distance(phi))
+    placed = [np.zeros(3), d5 * _direction(rng)]
+    draws = 0
+    while len(placed) <= NEIGHBOURS:
+        draws += 1
+        if draws > _MOST_DRAWS:
+            raise ValueError(f"scene {number}: no room for five neighbours at phi = {phi:.3g}")
+        radius = rng.uniform(1.0, d5) if law == "uniform" else np.cbrt(rng.uniform(1.0, d5**3))
+        candidate = radius * _direction(rng)
+        if all(np.sum((candidate - other) ** 2) > 1.0 for other in placed):
+            placed.append(candidate)
+    neighbours = np.array(placed[1:])
+    return neighbours[np.argsort(np.linalg.norm(neighbours, axis=1))], phi
+
+
+def random_scenes(seed: int, law: str, numbers, phi_range) -> tuple[np.ndarray, np.ndarray]:
+    """Several scenes: neighbours (m, 5, 3) [d_p] and phi (m,); see `random_scene`."""
+    scenes = [random_scene(seed, law, int(number), phi_range) for number in numbers]
+    neighbours = np.array([scene[0] for scene in scenes]).reshape(-1, NEIGHBOURS, 3)
+    return neighbours, np.array([scene[1] for scene in scenes])
+
+
+def _direction(rng) -> np.ndarray:
+    """Isotropic unit vector."""
+    vector = rng.standard_normal(3)
+    return vector / np.linalg.norm(vector)

@@ -1,0 +1,77 @@
+"""Triangular surface meshes of a sphere, made by gmsh. They know nothing of physics."""
+
+from dataclasses import dataclass
+
+import gmsh
+import numpy as np
+
+
+@dataclass(frozen=True)
+class SphereMesh:
+    """Triangles whose vertices lie on the unit sphere.
+
+    vertices: (n_vertices, 3), unit vectors. triangles: (n_triangles, 3), vertex numbers,
+    anticlockwise seen from outside. An element is the radial projection of the flat triangle
+    onto the sphere, so the geometry is exact at every mesh size.
+    """
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+
+    @property
+    def edges(self) -> np.ndarray:
+        """(n_edges, 2) vertex numbers, each edge once, the lower number first."""
+        t = self.triangles
+        sides = np.sort(np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]]), axis=1)
+        return np.unique(sides, axis=0)
+
+    def solid_angles(self) -> np.ndarray:
+        """(n_triangles,) solid angle of each element [sr] (van Oosterom and Strackee 1983)."""
+        a, b, c = (self.vertices[self.triangles[:, k]] for k in range(3))
+        triple = np.einsum("ij,ij->i", a, np.cross(b, c))
+        dots = sum(np.einsum("ij,ij->i", p, q) for p, q in ((a, b), (b, c), (c, a)))
+        return 2.0 * np.arctan2(triple, 1.0 + dots)
+
+
+def sphere_mesh(size: float) -> SphereMesh:
+    """Mesh the unit sphere with gmsh; `size` is the edge length [radii].
+
+    Raises ValueError unless 0 < size <= 1.5.
+    """
+    if not 0.0 < size <= 1.5:
+        raise ValueError(f"edge length {size} radii: it must lie in (0, 1.5]")
+
+    already_running = gmsh.isInitialized()
+    if not already_running:
+        gmsh.initialize(interruptible=False)
+    model_before = gmsh.model.getCurrent()
+    gmsh.option.setNumber("General.Verbosity", 2)
+    gmsh.model.add("sphere")
+    try:
+        gmsh.model.occ.addSphere(0.0, 0.0, 0.0, 1.0)
+        gmsh.model.occ.synchronize()
+        gmsh.option.setNumber("Mesh.MeshSizeMin", size)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+        gmsh.model.mesh.generate(2)
+        tags, coordinates, _ = gmsh.model.mesh.getNodes()
+        _, corners = gmsh.model.mesh.getElementsByType(
+            gmsh.model.mesh.getElementType("triangle", 1)
+        )
+    finally:
+        gmsh.model.remove()
+        if already_running:
+            gmsh.model.setCurrent(model_before)
+        else:
+            gmsh.finalize()
+
+    vertices = coordinates.reshape(-1, 3)
+    position = np.zeros(int(tags.max()) + 1, dtype=np.int64)
+    position[tags.astype(np.int64)] = np.arange(len(tags))
+    triangles = position[corners.astype(np.int64)].reshape(-1, 3)
+    used, triangles = np.unique(triangles, return_inverse=True)
+    vertices = vertices[used] / np.linalg.norm(vertices[used], axis=1, keepdims=True)
+    triangles = triangles.reshape(-1, 3)
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    inward = np.einsum("ij,ij->i", a, np.cross(b, c)) < 0.0
+    triangles[inward] = triangles[inward][:, [0, 2, 1]]
+    return SphereMesh(vertices, triangles)

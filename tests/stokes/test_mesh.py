@@ -1,0 +1,43 @@
+"""The templates are closed, outward and exactly spherical."""
+
+import numpy as np
+import pytest
+
+from dustfall.stokes.mesh import sphere_mesh
+
+
+@pytest.fixture(params=[1.0, 0.5, 0.3], scope="module")
+def mesh(request):
+    return sphere_mesh(request.param)
+
+
+def test_surface_is_closed_and_simple(mesh):
+    sides = mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    _, count = np.unique(np.sort(sides, axis=1), axis=0, return_counts=True)
+    assert (count == 2).all()
+    assert len(mesh.vertices) - len(mesh.edges) + len(mesh.triangles) == 2
+
+
+def test_elements_cover_the_sphere_once_and_face_outward(mesh):
+    np.testing.assert_allclose(np.linalg.norm(mesh.vertices, axis=1), 1.0, rtol=1e-15)
+    assert mesh.solid_angles().min() > 0.0
+    assert mesh.solid_angles().sum() == pytest.approx(4.0 * np.pi, rel=1e-13)
+
+
+def test_edges_have_the_length_asked_for():
+    for size in (0.7, 0.35):
+        mesh = sphere_mesh(size)
+        length = np.linalg.norm(np.diff(mesh.vertices[mesh.edges], axis=1)[:, 0], axis=1)
+        assert 0.75 * size < np.median(length) < 1.25 * size
+
+
+def test_same_size_gives_the_same_mesh():
+    one, other = sphere_mesh(0.5), sphere_mesh(0.5)
+    np.testing.assert_array_equal(one.vertices, other.vertices)
+    np.testing.assert_array_equal(one.triangles, other.triangles)
+
+
+@pytest.mark.parametrize("size", [0.0, -1.0, 2.0, np.nan])
+def test_impossible_edge_length_is_refused(size):
+    with pytest.raises(ValueError, match="edge length"):
+        sphere_mesh(size)

@@ -1,0 +1,62 @@
+"""Random scenes follow their law, and each hangs on the seed and its own number alone."""
+
+import numpy as np
+import pytest
+from scipy.stats import kstest
+
+from dustfall.scenes import LAWS, fifth_distance, random_scene, random_scenes, volume_fraction
+
+RANGE = (1e-8, 1e-3)
+
+
+def test_volume_fraction_of_the_notes():
+    assert fifth_distance(1e-3) == pytest.approx(8.55, abs=0.005)
+    assert fifth_distance(1e-8) == pytest.approx(397, abs=0.5)
+    phi = np.array([1e-8, 1e-5, 1e-2])
+    np.testing.assert_allclose(volume_fraction(fifth_distance(phi)), phi, rtol=1e-14)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_scenes_follow_their_law(law):
+    neighbours, phi = random_scenes(1, law, range(1500), RANGE)
+    distance = np.linalg.norm(neighbours, axis=2)
+    d5 = fifth_distance(phi)
+    assert (np.diff(distance, axis=1) >= 0).all()
+    np.testing.assert_allclose(distance[:, 4], d5, rtol=1e-12)
+    assert kstest(np.log(phi), "uniform", (np.log(1e-8), np.log(1e5))).pvalue > 1e-3
+    # Where there is much room, rejected overlaps do not show in the radii.
+    dilute = d5 > 50
+    inner, outer = distance[dilute, :4], d5[dilute, None]
+    if law == "uniform":
+        level = (inner - 1.0) / (outer - 1.0)
+    else:
+        level = (inner**3 - 1.0) / (outer**3 - 1.0)
+    assert kstest(level.ravel(), "uniform").pvalue > 1e-3
+    directions = neighbours / distance[:, :, None]
+    assert np.abs(directions.mean(axis=(0, 1))).max() < 4.0 / np.sqrt(3 * directions[..., 0].size)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_no_spheres_overlap(law):
+    neighbours, _ = random_scenes(1, law, range(300), (1e-3, 0.05))
+    for own in neighbours:
+        spheres = np.concatenate([np.zeros((1, 3)), own])
+        distance = np.linalg.norm(spheres[:, None] - spheres[None], axis=2)
+        assert distance[np.triu_indices(6, 1)].min() > 1.0
+
+
+def test_a_scene_hangs_on_seed_law_and_number_alone():
+    together, phi = random_scenes(7, "uniform", range(20), RANGE)
+    alone, own = random_scene(7, "uniform", 13, RANGE)
+    np.testing.assert_array_equal(together[13], alone)
+    assert phi[13] == own
+    assert not np.array_equal(alone, random_scene(8, "uniform", 13, RANGE)[0])
+    assert random_scene(7, "ball", 13, RANGE)[1] != own
+
+
+def test_impossible_scenes_are_refused():
+    with pytest.raises(ValueError, match="allowed are uniform, ball"):
+        random_scene(1, "cube", 0, RANGE)
+    for bad in ((1e-3, 1e-8), (0.0, 1e-3), (1e-8, 0.5)):
+        with pytest.raises(ValueError, match="phi range"):
+            random_scene(1, "ball", 0, bad)
