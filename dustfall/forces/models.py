@@ -1,0 +1,242 @@
+"""Learned force models: prediction, and files that hold a model without code."""
+
+import hashlib
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save_file
+
+from dustfall.files import atomic
+from dustfall.forces.features import COMPONENTS, KINDS, RADIAL_INPUTS, describe
+from dustfall.forces.frames import NEIGHBOURS, check_neighbours
+from dustfall.forces.inference import evaluate
+
+FORMAT = "dustfall force model"
+VERSION = 1
+SHIPPED = Path(__file__).parent / "data" / "anchored.safetensors"
+
+ACTIVATION = {"streamwise": "relu", "lateral": "tanh"}
+"""Activation of each component's hidden layers (paper, section "Deterministic model")."""
+
+INPUTS = {False: 3, True: 5}  # numbers a neighbour: spherical coordinates; 1/r, log r, unit vector
+
+# Each row: block, first neighbour, number of neighbours, column of the envelope.
+_APPLICATIONS = {
+    False: np.array([[0, 0, NEIGHBOURS, 0]]),
+    True: np.array([[0, 0, 2, 0], [1, 2, 1, 1], [1, 3, 1, 2], [1, 4, 1, 3]]),
+}
+
+
+def parse_layers(layers: str, kind: str) -> list[list[int]]:
+    """Return the hidden widths of each block: "40-40/30-30-30" -> [[40, 40], [30, 30, 30]].
+
+    An IDNN has two blocks, second order / first order; a dense network has one, as in "60-60".
+    Raises ValueError for an unknown kind, another number of blocks, or a width below one.
+    """
+    if kind not in KINDS:
+        raise ValueError(f"kind is {kind!r}; it must be one of {', '.join(KINDS)}")
+    blocks = layers.split("/") if isinstance(layers, str) else []
+    widths = [block.split("-") for block in blocks]
+    expected, example = (2, "40-40/30-30-30") if KINDS[kind].decomposed else (1, "60-60")
+    if len(widths) != expected or not all(
+        width.isascii() and width.isdigit() and int(width) > 0 for row in widths for width in row
+    ):
+        raise ValueError(f"layers is {layers!r}; {kind} takes hidden widths such as {example!r}")
+    return [[int(width) for width in row] for row in widths]
+
+
+def block_widths(kind: str, layers: str, component: str) -> list[list[int]]:
+    """Return each block's widths from its inputs over the hidden layers to its outputs."""
+    layout = KINDS[kind]
+    neighbours = (2, 1) if layout.decomposed else (NEIGHBOURS,)
+    return [
+        [number * INPUTS[layout.anchored], *hidden, len(COMPONENTS[component])]
+        for number, hidden in zip(neighbours, parse_layers(layers, kind), strict=True)
+    ]
+
+
+@dataclass(frozen=True)
+class Network:
+    """Trained weights of one component's network.
+
+    blocks: per block, per layer, the weight (out, in) and the bias (out,), the last layer without
+    bias. mean and scale (F,) normalise the inputs; `unit` is the size of the output in Re_p c_D.
+    """
+
+    component: str
+    blocks: list[list[tuple[np.ndarray, ...]]]
+    mean: np.ndarray
+    scale: np.ndarray
+    unit: float
+
+    @property
+    def parameters(self) -> int:
+        """Number of trained weights and biases."""
+        return sum(array.size for block in self.blocks for layer in block for array in layer)
+
+    def residual(self, inputs: np.ndarray, envelope: np.ndarray) -> np.ndarray:
+        """Return the output (m, 1 or 2) in Re_p c_D for inputs (m, 5, F) and envelope (m, 4)."""
+        parameters, widths = self._packed
+        return self.unit * evaluate(
+            inputs,
+            envelope,
+            self.mean,
+            self.scale,
+            parameters,
+            widths,
+            _APPLICATIONS[len(self.blocks) == 2],
+            ACTIVATION[self.component] == "tanh",
+            len(COMPONENTS[self.component]),
+        )
+
+    @cached_property
+    def _packed(self):
+        depth = max(len(block) for block in self.blocks)
+        widths = np.zeros((len(self.blocks), depth + 1), np.int64)
+        vectors = []
+        for number, block in enumerate(self.blocks):
+            parts = []
+            widths[number, 0] = block[0][0].shape[1]
+            for index, (weight, *bias) in enumerate(block):
+                widths[number, index + 1] = len(weight)
+                parts += [weight.ravel(), bias[0] if bias else np.zeros(len(weight))]
+            vectors.append(np.concatenate(parts).astype(float))
+        parameters = np.zeros((len(vectors), max(map(len, vectors))))
+        for row, vector in zip(parameters, vectors, strict=True):
+            row[: len(vector)] = vector
+        return parameters, widths
+
+
+class LearnedModel:
+    """A dense ANN, an IDNN or an anchored IDNN with its trained networks.
+
+    `header` describes the model in plain values (kind, layers, inputs, units, frame, training);
+    `history` holds, for a model just trained, the epochs and validation errors of each component.
+
+    Out of range: a neighbour closer than contact is held at contact. Neighbours further away than
+    any in training are seen by the networks at that distance, and what the networks add fades as
+    1/distance, so that the force goes over into Stokes drag (see `features.describe`).
+    """
+
+    def __init__(self, header: dict, networks: dict[str, Network], history: dict | None = None):
+        self.header = header
+        self.networks = networks
+        self.history = history or {}
+
+    @property
+    def name(self) -> str:
+        """Kind of the model: dense, idnn or anchored."""
+        return self.header["kind"]
+
+    def predict(self, neighbours) -> np.ndarray:
+        """Return the force (m, 3) in Re_p c_D on the reference sphere at the origin.
+
+        Parameters: `neighbours` (m, 5, 3), Cartesian, in d_p, in the frame of the flow (x spanwise,
+        y streamwise, z vertical). Their order does not matter, except for the paper's dense network
+        of unsorted neighbours. Raises ValueError for neighbours of another shape, not finite, or at
+        the centre of the reference sphere.
+        """
+        scenes = describe(
+            self.name,
+            check_neighbours(neighbours),
+            self.header["radial_input"],
+            self.header["largest_distance"],
+        )
+        force = np.empty((len(scenes.inputs), 3))
+        for component, network in self.networks.items():
+            residual = network.residual(scenes.inputs, scenes.envelope)
+            force[:, COMPONENTS[component]] = scenes.force(residual, component)
+        return force
+
+    def save(self, path) -> None:
+        """Write the model to `path`: safetensors, with the header as JSON in its metadata."""
+        tensors = _tensors(self.networks)
+        header = {**self.header, "checksum": _checksum(tensors)}
+        with atomic(path) as temporary:
+            save_file(tensors, temporary, {"header": json.dumps(header, sort_keys=True)})
+
+
+def load_model(path=None) -> LearnedModel:
+    """Return the learned model in a file; without a path, the anchored IDNN of this package.
+
+    Nothing in the file is executed. Raises FileNotFoundError where there is no such file, and
+    ValueError for a file that is damaged, of another layout or of another format version.
+    """
+    shipped = path is None
+    path = SHIPPED if shipped else Path(path)
+    if not path.is_file():
+        what = "the anchored model that ships with dustfall" if shipped else "force model"
+        raise FileNotFoundError(f"{what} not found: there is no file {path}")
+    try:
+        with safe_open(path, framework="numpy") as file:
+            metadata = file.metadata() or {}
+            header = json.loads(metadata.get("header", "null"))
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+    except (SafetensorError, json.JSONDecodeError) as error:
+        raise ValueError(f"{path} is damaged or no safetensors file: {error}") from error
+    if not isinstance(header, dict) or header.get("format") != FORMAT:
+        raise ValueError(f"{path} is a safetensors file, but holds no {FORMAT}")
+    if header.get("version") != VERSION:
+        raise ValueError(
+            f"{path} has format version {header.get('version')!r}; this dustfall reads {VERSION}"
+        )
+    if header.pop("checksum", None) != _checksum(tensors):
+        raise ValueError(f"{path} is damaged: its weights do not match their checksum")
+    try:
+        networks = {component: _network(tensors, header, component) for component in COMPONENTS}
+    except (KeyError, TypeError, ValueError) as error:
+        raise ValueError(f"{path} has another layout than its header says: {error}") from error
+    return LearnedModel(header, networks)
+
+
+def _tensors(networks):
+    tensors = {}
+    for component, network in networks.items():
+        tensors[f"{component}.mean"] = network.mean
+        tensors[f"{component}.scale"] = network.scale
+        tensors[f"{component}.unit"] = np.array([network.unit])
+        for number, block in enumerate(network.blocks):
+            for index, arrays in enumerate(block):
+                for array, what in zip(arrays, ("weight", "bias"), strict=False):
+                    tensors[f"{component}.{number}.{index}.{what}"] = np.ascontiguousarray(array)
+    return tensors
+
+
+def _network(tensors, header, component):
+    if header["radial_input"] not in RADIAL_INPUTS or not header["largest_distance"] > 0:
+        raise ValueError("radial_input or largest_distance has no allowed value")
+
+    def tensor(name, *shape):
+        array = tensors[f"{component}.{name}"]
+        if array.shape != shape or array.dtype not in (np.float32, np.float64):
+            raise ValueError(f"{component}.{name} is {array.dtype}{array.shape}, not {shape}")
+        if not np.isfinite(array).all():
+            raise ValueError(f"{component}.{name} holds a value that is not finite")
+        return array
+
+    widths = block_widths(header["kind"], header["layers"][component], component)
+    blocks = []
+    for number, row in enumerate(widths):
+        layers = []
+        for index, (wide, narrow) in enumerate(pairwise(row)):
+            layer = (tensor(f"{number}.{index}.weight", narrow, wide),)
+            if index + 2 < len(row):
+                layer += (tensor(f"{number}.{index}.bias", narrow),)
+            layers.append(layer)
+        blocks.append(layers)
+    features = INPUTS[KINDS[header["kind"]].anchored]
+    mean, scale = tensor("mean", features), tensor("scale", features)
+    return Network(component, blocks, mean, scale, float(tensor("unit", 1)[0]))
+
+
+def _checksum(tensors):
+    digest = hashlib.sha256()
+    for name in sorted(tensors):
+        digest.update(f"{name} {tensors[name].dtype} {tensors[name].shape}".encode())
+        digest.update(tensors[name].tobytes())
+    return digest.hexdigest()

@@ -1,0 +1,28 @@
+"""Scenes and forces that the tests of the force models share."""
+
+import numpy as np
+
+from dustfall.forces import RotnePrager
+
+LAYERS = {"dense": "24-24", "idnn": "24-24/16-16", "anchored": "16-16/12-12"}
+
+
+def random_neighbours(number, seed=0, nearest=1.0, farthest=397.0):
+    """Isotropic directions; log-uniform size of the scene, distances uniform within it."""
+    rng = np.random.default_rng(seed)
+    direction = rng.normal(size=(number, 5, 3))
+    direction /= np.linalg.norm(direction, axis=2, keepdims=True)
+    size = np.exp(rng.uniform(np.log(8.0), np.log(farthest), (number, 1)))
+    distance = rng.uniform(nearest, size, (number, 5))
+    return distance[:, :, None] * direction
+
+
+def corrected_forces(neighbours):
+    """Rotne-Prager forces with a correction of each pair that has the symmetries of Stokes flow.
+
+    Its form, r r / |r|^6, is that of the first term (stresslet reflected by the other sphere)
+    that the Rotne-Prager mobility leaves out.
+    """
+    distance = np.linalg.norm(neighbours, axis=2, keepdims=True)
+    correction = (neighbours[:, :, 1:2] * neighbours / distance**6).sum(axis=1)
+    return RotnePrager().predict(neighbours) - 4.0 * correction
