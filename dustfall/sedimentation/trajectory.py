@@ -1,0 +1,192 @@
+"""What a run leaves behind: its trajectory, its series, and the records they are made from."""
+
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+
+from dustfall import __version__
+from dustfall.files import atomic
+
+TRACKED = 3
+"""Particles whose position, velocity and force the series holds at every step."""
+
+SERIES = np.dtype(
+    [
+        ("time", "f8"),
+        ("settling_velocity_mean", "f8"),
+        ("settling_velocity_variance", "f8"),
+        ("inverse_beta_mean", "f8"),
+        ("beta_mean", "f8"),
+        ("new_neighbours", "f8"),
+        ("overlaps", "i8"),
+        ("tracked_position", "f8", (TRACKED, 3)),
+        ("tracked_velocity", "f8", (TRACKED, 3)),
+        ("tracked_force", "f8", (TRACKED, 3)),
+    ]
+)
+
+SERIES_MEANING = {
+    "time": ("tau", "time since the start"),
+    "settling_velocity_mean": ("v_s", "mean downward velocity of the particles"),
+    "settling_velocity_variance": ("v_s^2", "variance of the downward velocity over particles"),
+    "inverse_beta_mean": ("1", "mean over particles of 1/beta, beta = F'_y / 24"),
+    "beta_mean": ("1", "mean over particles of beta = F'_y / 24"),
+    "new_neighbours": ("1", "fraction of particles with another set of five than a step ago"),
+    "overlaps": ("1", "pairs of neighbours with centres closer than a diameter"),
+    "tracked_position": ("d_p", "unwrapped position of tracked particles, z upwards"),
+    "tracked_velocity": ("v_s", "velocity of tracked particles, z upwards"),
+    "tracked_force": ("1", "drag on tracked particles over weight minus buoyancy, z upwards"),
+}
+
+
+def frame_type(particles: int, precision: str) -> np.dtype:
+    """Record of one frame; velocities and drag need no more than single precision."""
+    return np.dtype(
+        [
+            ("time", "f8"),
+            ("coordinates", precision, (particles, 3)),
+            ("velocities", "f4", (particles, 3)),
+            ("drag_coefficient", "f4", (particles,)),
+        ]
+    )
+
+
+class Records:
+    """Records of one fixed size, appended to a plain file.
+
+    A file of fixed-size records can be cut back to a known count, which is what a run needs that
+    was killed while it wrote; a half-written NetCDF file is lost.
+
+    Raises
+    ------
+    ValueError : the file holds fewer than `count` records.
+    """
+
+    def __init__(self, path: Path, record: np.dtype, count: int = 0):
+        self.path = path
+        self.record = record
+        self.file = open(path, "r+b" if count else "w+b")  # noqa: SIM115 - open for a whole run
+        size = os.fstat(self.file.fileno()).st_size
+        if size < count * record.itemsize:
+            self.file.close()
+            raise ValueError(
+                f"{path} holds {size // record.itemsize} records, {count} are expected"
+            )
+        self.file.truncate(count * record.itemsize)
+        self.file.seek(0, os.SEEK_END)
+        self.count = count
+
+    def append(self, **values) -> None:
+        """Write one record, given field by field."""
+        row = np.empty((), self.record)
+        for name in self.record.names:
+            row[name] = values[name]
+        self.file.write(row.tobytes())
+        self.count += 1
+
+    def sync(self) -> None:
+        """Make sure that all records so far survive a crash of the machine."""
+        self.file.flush()
+        os.fsync(self.file.fileno())
+
+    def __iter__(self) -> Iterator[np.ndarray]:
+        """The records from the first on, one in memory at a time."""
+        self.file.flush()
+        with open(self.path, "rb") as file:
+            for _ in range(self.count):
+                yield np.frombuffer(file.read(self.record.itemsize), self.record)[0]
+
+    def remove(self) -> None:
+        """Close the file and delete it."""
+        self.file.close()
+        self.path.unlink()
+
+
+def write_trajectory(path: Path, frames: Records, side: float, attributes: Mapping) -> None:
+    """Write frames as NetCDF-4 in the AMBER convention, which OVITO and xarray open.
+
+    Coordinates are unwrapped; `cell_lengths` folds them back into the cube. Lengths are in d_p,
+    times in tau, velocities in v_s, as each variable's `units` say; `attributes` hold what these
+    are in SI.
+    """
+    particles = frames.record["coordinates"].shape[0]
+    with atomic(path) as temporary, netCDF4.Dataset(temporary, "w", format="NETCDF4") as file:
+        file.setncatts(
+            {
+                "Conventions": "AMBER",
+                "ConventionVersion": "1.0",
+                "program": "dustfall",
+                "programVersion": __version__,
+                "application": "dustfall.sedimentation",
+                "title": "Sedimentation in a periodic cube",
+                **attributes,
+            }
+        )
+        for name, size in {"frame": None, "spatial": 3, "atom": particles}.items():
+            file.createDimension(name, size)
+        for name, size in {"cell_spatial": 3, "cell_angular": 3, "label": 5}.items():
+            file.createDimension(name, size)
+
+        def variable(name, kind, dimensions, units="", meaning="", **options):
+            result = file.createVariable(name, kind, dimensions, **options)
+            if units:
+                result.units = units
+                result.long_name = meaning
+            return result
+
+        variable("spatial", "S1", ("spatial",))[:] = np.array(list("xyz"), "S1")
+        variable("cell_spatial", "S1", ("cell_spatial",))[:] = np.array(list("abc"), "S1")
+        variable("cell_angular", "S1", ("cell_angular", "label"))[:] = np.array(
+            [list("alpha"), list("beta "), list("gamma")], "S1"
+        )
+        time = variable("time", "f8", ("frame",), "tau", "time since the start")
+        lengths = variable(
+            "cell_lengths", "f8", ("frame", "cell_spatial"), "d_p", "side of the cube"
+        )
+        angles = variable("cell_angles", "f8", ("frame", "cell_angular"), "degree", "right angles")
+        meaning = {
+            "coordinates": ("d_p", "unwrapped positions, z upwards"),
+            "velocities": ("v_s", "velocities, z upwards"),
+            "drag_coefficient": ("1", "beta = F'_y / 24, drag over that of an isolated sphere"),
+        }
+        columns = {}
+        for name, (units, words) in meaning.items():
+            base, shape = frames.record[name].subdtype
+            columns[name] = variable(
+                name,
+                base,
+                ("frame", "atom", "spatial")[: 1 + len(shape)],
+                units,
+                words,
+                chunksizes=(1, *shape),
+            )
+        for k, frame in enumerate(frames):
+            time[k] = frame["time"]
+            lengths[k] = side
+            angles[k] = 90.0
+            for name, column in columns.items():
+                column[k] = frame[name]
+
+
+def write_series(path: Path, series: Records, tracked: np.ndarray, attributes: Mapping) -> None:
+    """Write the series of a run as NetCDF-4 with dimensions step, tracked and spatial.
+
+    `tracked` (3,) are the rows of the tracked particles in the trajectory.
+    """
+    with atomic(path) as temporary, netCDF4.Dataset(temporary, "w", format="NETCDF4") as file:
+        file.setncatts({"title": "Sedimentation in a periodic cube, every step", **attributes})
+        for name, size in {"step": series.count, "tracked": TRACKED, "spatial": 3}.items():
+            file.createDimension(name, size)
+        file.createVariable("spatial", "S1", ("spatial",))[:] = np.array(list("xyz"), "S1")
+        file.createVariable("tracked", "i8", ("tracked",))[:] = tracked
+        file["tracked"].long_name = "row of the particle in the trajectory"
+        rows = np.fromiter(series, SERIES, series.count)
+        for name, (units, meaning) in SERIES_MEANING.items():
+            dimensions = ("step", "tracked", "spatial")[: rows[name].ndim]
+            column = file.createVariable(name, rows[name].dtype, dimensions)
+            column.units = units
+            column.long_name = meaning
+            column[:] = rows[name]

@@ -1,0 +1,53 @@
+import pytest
+
+from dustfall.sedimentation import Properties
+
+
+def test_default_properties_are_those_of_the_papers_table():
+    dust = Properties()
+    assert dust.response_time == pytest.approx(4.79589e-3, abs=5e-9)
+    assert dust.settling_velocity == pytest.approx(0.0470, abs=5e-5)
+    assert dust.galileo == pytest.approx(0.078, abs=5e-4)
+
+
+def test_weight_less_buoyancy_balances_stokes_drag_at_the_settling_velocity():
+    water = Properties(1000.0, 1e-3, 1e-4, 2650.0, 9.81)
+    volume = 3.141592653589793 / 6 * water.diameter**3
+    weight = volume * (water.particle_density - water.fluid_density) * water.gravity
+    drag = 3 * 3.141592653589793 * water.viscosity * water.diameter * water.settling_velocity
+    assert drag == pytest.approx(weight, rel=1e-12)
+
+
+def test_stokes_number_is_the_diameters_settled_in_a_response_time():
+    dust = Properties()
+    assert dust.stokes_number == pytest.approx(0.0470 * 4.79589e-3 / 25e-6, rel=1e-3)
+
+
+@pytest.mark.parametrize("change", ["gravity", "viscosity", "diameter", "particle_density"])
+def test_galileo_multiple_multiplies_the_galileo_number(change):
+    dust = Properties()
+    assert dust.with_galileo_multiple(4, change).galileo == pytest.approx(
+        4 * dust.galileo, rel=1e-12
+    )
+
+
+def test_galileo_multiple_changes_gravity_alone_by_default():
+    assert Properties().with_galileo_multiple(2) == Properties(gravity=2 * 9.81)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "named"),
+    [
+        ({"viscosity": 0.0}, "viscosity is 0.0"),
+        ({"diameter": float("nan")}, "diameter is nan"),
+        ({"particle_density": 1.0}, "particle_density is 1.0"),
+    ],
+)
+def test_impossible_properties_are_refused_by_name(wrong, named):
+    with pytest.raises(ValueError, match=named):
+        Properties(**wrong)
+
+
+def test_unknown_way_to_the_galileo_number_is_refused():
+    with pytest.raises(ValueError, match="fluid_density"):
+        Properties().with_galileo_multiple(2, "fluid_density")

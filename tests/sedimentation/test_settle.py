@@ -1,0 +1,421 @@
+import os
+import signal
+import subprocess
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.spatial import cKDTree
+
+from dustfall.forces.rotne_prager import IsolatedStokes, RotnePrager
+from dustfall.sedimentation import Properties, cube_side, random_positions, settle
+
+DUST = Properties()
+
+
+class ConstantDrag:
+    name = "constant"
+
+    def __init__(self, beta):
+        self.beta = beta
+
+    def predict(self, neighbours):
+        return np.tile([0, 24 * self.beta, 0], (len(neighbours), 1))
+
+
+def run(folder, model=None, **changes):
+    """Settle with small defaults; return trajectory and series as xarray datasets."""
+    settings = {
+        "model": model or RotnePrager(),
+        "properties": DUST,
+        "particles": 100,
+        "volume_fraction": 1e-3,
+        "step": 0.1,
+        "duration": 2.0,
+        "save_interval": 0.5,
+        "seed": 1,
+        "precision": "float64",
+        "trajectory": Path(folder) / "case.nc",
+        "series": Path(folder) / "case.series.nc",
+    } | changes
+    settle(**settings)
+    return (
+        xr.load_dataset(settings["trajectory"]),
+        xr.load_dataset(settings["series"]),
+    )
+
+
+def six_in_a_cloud():
+    """Six particles that stay each other's neighbours, far from their images."""
+    rng = np.random.default_rng(11)
+    return (
+        50
+        + 4 * np.eye(6, 3)
+        + 3 * np.repeat([[0, 0, 0], [1, 1, 1]], 3, axis=0)
+        + rng.random((6, 3))
+    )
+
+
+# Truths of the motion
+
+
+def test_isolated_sphere_falls_as_the_exact_solution(tmp_path):
+    _, series = run(tmp_path, IsolatedStokes(), volume_fraction=1e-6, step=0.25, duration=5.0)
+    t = series.time.values
+    velocity = series.tracked_velocity.values
+    fallen = (series.tracked_position - series.tracked_position[0]).values
+    np.testing.assert_allclose(
+        velocity[:, :, 2], -(1 - np.exp(-t))[:, None].repeat(3, 1), atol=1e-12
+    )
+    expected = -DUST.stokes_number * (t - 1 + np.exp(-t))
+    np.testing.assert_allclose(fallen[:, :, 2], expected[:, None].repeat(3, 1), atol=1e-12)
+    np.testing.assert_array_equal(velocity[:, :, :2], 0)
+    np.testing.assert_allclose(series.settling_velocity_mean, 1 - np.exp(-t), atol=1e-12)
+    np.testing.assert_allclose(series.settling_velocity_variance, 0, atol=1e-25)
+
+
+@pytest.mark.parametrize("beta", [0.5, 0.7, 1.8])
+def test_any_constant_drag_coefficient_is_exact_at_any_step(tmp_path, beta):
+    _, series = run(tmp_path, ConstantDrag(beta), step=1.0, duration=4.0, save_interval=4.0)
+    t = series.time.values
+    np.testing.assert_allclose(
+        series.settling_velocity_mean, (1 - np.exp(-beta * t)) / beta, rtol=1e-12
+    )
+    np.testing.assert_allclose(series.inverse_beta_mean, 1 / beta, rtol=1e-14)
+
+
+def test_stokes_start_of_isolated_spheres_is_their_steady_state(tmp_path):
+    _, series = run(tmp_path, IsolatedStokes(), start="stokes")
+    np.testing.assert_array_equal(series.settling_velocity_mean, 1)
+    np.testing.assert_allclose(series.tracked_force, np.tile([0, 0, 1], (21, 3, 1)), atol=1e-15)
+
+
+def test_time_stepping_is_of_second_order(tmp_path):
+    def end(step):
+        _, series = run(
+            tmp_path, particles=6, volume_fraction=1e-6, positions=six_in_a_cloud(), step=step,
+            save_interval=2.0,
+        )  # fmt: skip
+        return np.stack([series.tracked_position[-1], 10 * series.tracked_velocity[-1]])
+
+    exact = end(2 / 1024)
+    error = [np.abs(end(step) - exact).max() for step in (0.2, 0.1, 0.05, 0.025)]
+    order = np.log2(np.divide(error[:-1], error[1:]))
+    assert (order > 1.8).all(), (error, order)
+
+
+def test_change_of_momentum_is_the_sum_of_weight_and_drag(tmp_path):
+    _, series = run(
+        tmp_path, particles=6, volume_fraction=1e-6, positions=six_in_a_cloud(), step=0.01,
+        save_interval=2.0,
+    )  # fmt: skip
+    force = series.tracked_force.values - [0, 0, 1]
+    impulse = 0.01 * (force[1:] + force[:-1]).sum(axis=0) / 2
+    change = (series.tracked_velocity[-1] - series.tracked_velocity[0]).values
+    np.testing.assert_allclose(impulse, change, atol=2e-5)
+
+
+def test_steady_drag_carries_weight_less_buoyancy(tmp_path):
+    trajectory, _ = run(tmp_path, particles=300, duration=12.0, save_interval=1.0)
+    late = trajectory.isel(frame=slice(8, None))
+    acceleration = late.velocities.mean("atom").diff("frame")[:, 2]
+    assert np.abs(acceleration).max() < 0.02
+    drag = (late.drag_coefficient * -late.velocities[:, :, 2]).mean()
+    assert float(drag) == pytest.approx(1, abs=0.05)
+
+
+def test_motion_is_the_same_wherever_the_box_is_cut(tmp_path):
+    side = cube_side(100, 1e-3)
+    positions = random_positions(np.random.default_rng(1), 100, 1e-3)
+    shift = np.array([12.3, -40.1, 7.7])
+    here, _ = run(tmp_path, positions=positions)
+    there, _ = run(tmp_path, positions=(positions + shift) % side)
+    np.testing.assert_allclose(there.velocities, here.velocities, atol=1e-6)
+    travelled = here.coordinates - here.coordinates[0]
+    travelled_there = there.coordinates - there.coordinates[0]
+    np.testing.assert_allclose(travelled_there, travelled, atol=1e-9)
+
+
+def test_motion_turns_with_the_cloud_about_gravity(tmp_path):
+    positions = random_positions(np.random.default_rng(1), 100, 1e-3)
+    quarter_turn = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    here, _ = run(tmp_path, positions=positions)
+    there, _ = run(tmp_path, positions=positions @ quarter_turn.T)
+    np.testing.assert_allclose(
+        there.coordinates, here.coordinates.values @ quarter_turn.T, atol=1e-8
+    )
+
+
+@pytest.mark.parametrize(
+    ("volume_fraction", "inverse_beta"),
+    [(1e-3, 1.458), (1e-4, 1.204), (1e-5, 1.094), (1e-6, 1.043), (1e-7, 1.020), (1e-8, 1.009)],
+)
+def test_random_cloud_starts_at_the_known_mean_inverse_beta(
+    tmp_path, volume_fraction, inverse_beta
+):
+    # Means over 3000 random environments with the inverse of the Rotne-Prager mobility.
+    _, series = run(
+        tmp_path, particles=3000, volume_fraction=volume_fraction, duration=0.1, save_interval=0.1
+    )
+    assert float(series.inverse_beta_mean[0]) == pytest.approx(inverse_beta, abs=0.01)
+
+
+# Truths of the files
+
+
+def test_series_agrees_with_the_trajectory(tmp_path):
+    trajectory, series = run(
+        tmp_path, volume_fraction=0.1, step=0.1, duration=1.0, save_interval=0.1
+    )
+    side = series.attrs["cell_length"]
+    falling = -trajectory.velocities[:, :, 2]
+    np.testing.assert_allclose(series.time, trajectory.time, rtol=1e-14)
+    np.testing.assert_allclose(series.settling_velocity_mean, falling.mean("atom"), atol=1e-6)
+    np.testing.assert_allclose(series.settling_velocity_variance, falling.var("atom"), atol=1e-6)
+    beta = trajectory.drag_coefficient
+    np.testing.assert_allclose(series.beta_mean, beta.mean("atom"), rtol=1e-5)
+    np.testing.assert_allclose(series.inverse_beta_mean, (1 / beta).mean("atom"), rtol=1e-5)
+    tracked = series.tracked.values
+    np.testing.assert_array_equal(series.tracked_position, trajectory.coordinates[:, tracked])
+    np.testing.assert_allclose(
+        series.tracked_velocity, trajectory.velocities[:, tracked], 1e-6, 1e-7
+    )
+
+    fives, overlaps = [], []
+    for frame in trajectory.coordinates.values:
+        tree = cKDTree(frame % side, boxsize=side)
+        fives.append(np.sort(tree.query(frame % side, k=6)[1][:, 1:], axis=1))
+        overlaps.append(len(tree.query_pairs(1.0)))
+    fresh = [0.0, *((a != b).any(axis=1).mean() for a, b in pairwise(fives))]
+    np.testing.assert_allclose(series.new_neighbours, fresh)
+    np.testing.assert_array_equal(series.overlaps, overlaps)
+    assert max(fresh) > 0
+    assert max(overlaps) > 0
+
+
+def test_trajectory_follows_the_amber_convention(tmp_path):
+    run(tmp_path, precision="float32")
+    with netCDF4.Dataset(tmp_path / "case.nc") as file:
+        assert file.Conventions == "AMBER"
+        assert file.ConventionVersion == "1.0"
+        assert file.program
+        assert file.programVersion
+        assert file.dimensions["frame"].isunlimited()
+        assert {name: len(file.dimensions[name]) for name in ("spatial", "atom", "label")} == {
+            "spatial": 3, "atom": 100, "label": 5,
+        }  # fmt: skip
+        assert b"".join(file["spatial"][:].filled()) == b"xyz"
+        assert b"".join(file["cell_spatial"][:].filled()) == b"abc"
+        assert [b"".join(row) for row in file["cell_angular"][:].filled()] == [
+            b"alpha", b"beta ", b"gamma",
+        ]  # fmt: skip
+        assert file["coordinates"].dimensions == ("frame", "atom", "spatial")
+        assert file["coordinates"].dtype == np.float32
+        assert file["velocities"].dimensions == ("frame", "atom", "spatial")
+        assert file["drag_coefficient"].dimensions == ("frame", "atom")
+        np.testing.assert_allclose(file["time"][:], [0, 0.5, 1, 1.5, 2])
+        np.testing.assert_allclose(file["cell_lengths"][:], cube_side(100, 1e-3))
+        np.testing.assert_array_equal(file["cell_angles"][:], 90)
+        assert file["cell_angles"].units == "degree"
+        for name in ("time", "coordinates", "velocities", "cell_lengths", "drag_coefficient"):
+            assert file[name].units
+
+
+def test_files_name_their_units_settings_and_model(tmp_path):
+    for dataset in run(tmp_path):
+        assert dataset.attrs["n"] == 100
+        assert dataset.attrs["volume_fraction"] == 1e-3
+        assert dataset.attrs["galileo"] == DUST.galileo
+        assert dataset.attrs["stokes_number"] == DUST.stokes_number
+        assert dataset.attrs["seed"] == 1
+        assert dataset.attrs["model"] == "rotne_prager"
+        assert dataset.attrs["viscosity"] == DUST.viscosity
+        assert dataset.attrs["cell_length"] == cube_side(100, 1e-3)
+    _, series = run(tmp_path)
+    assert all(series[name].attrs["units"] for name in series.data_vars)
+    assert series.tracked_force.dims == ("step", "tracked", "spatial")
+    assert series.sizes == {"step": 21, "tracked": 3, "spatial": 3}
+
+
+def test_models_that_differ_have_different_digests(tmp_path):
+    first, _ = run(tmp_path, ConstantDrag(0.7))
+    second, _ = run(tmp_path, ConstantDrag(0.8))
+    assert first.attrs["model_digest"] != second.attrs["model_digest"]
+
+
+def test_same_seed_gives_the_same_bits_and_another_seed_does_not(tmp_path):
+    files = [tmp_path / f"{k}.nc" for k in range(3)]
+    for file, seed in zip(files, (5, 5, 6), strict=True):
+        run(tmp_path, seed=seed, trajectory=file)
+    first, again, other = (xr.load_dataset(file) for file in files)
+    assert first.identical(again)
+    assert not np.array_equal(first.coordinates, other.coordinates)
+
+
+# Runs that are interrupted
+
+KILLED_RUN = """
+import os, signal, sys
+from pathlib import Path
+from dustfall.forces.rotne_prager import RotnePrager
+from dustfall.sedimentation import Properties, settle
+
+def kill(done, total):
+    if done == int(sys.argv[2]):
+        os.kill(os.getpid(), signal.SIGKILL)
+
+folder = Path(sys.argv[1])
+settle(RotnePrager(), Properties(), 100, 1e-3, 0.1, 2.0, 0.5, 1, folder / "case.nc",
+       folder / "case.series.nc", precision="float64", checkpoint=folder / "checkpoint",
+       checkpoint_interval=0.0, progress=kill)
+"""
+
+
+def assert_same_files(folder, other):
+    for name in ("case.nc", "case.series.nc"):
+        assert xr.load_dataset(folder / name).identical(xr.load_dataset(other / name))
+    assert sorted(path.name for path in folder.iterdir()) == ["case.nc", "case.series.nc"]
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("undisturbed")
+    run(folder)
+    return folder
+
+
+def test_killed_run_goes_on_to_the_same_bits(tmp_path, undisturbed):
+    for step in (6, 15):
+        killed = subprocess.run(
+            [sys.executable, "-c", KILLED_RUN, str(tmp_path), str(step)], check=False
+        )
+        assert killed.returncode == -signal.SIGKILL
+        assert not (tmp_path / "case.nc").exists()
+    steps = []
+    run(
+        tmp_path,
+        checkpoint=tmp_path / "checkpoint",
+        progress=lambda done, total: steps.append(done),
+    )
+    assert steps == list(range(15, 21))
+    assert_same_files(tmp_path, undisturbed)
+
+
+class Interruption(BaseException):
+    """Stands for a crash at a chosen place; nothing in the library catches it."""
+
+
+@pytest.mark.parametrize("replacement", range(1, 6))
+def test_run_that_crashes_amid_a_checkpoint_goes_on_to_the_same_bits(
+    tmp_path, undisturbed, monkeypatch, replacement
+):
+    count = 0
+
+    def crash(source, target, replace=os.replace):
+        nonlocal count
+        count += 1
+        if count == replacement:
+            raise Interruption
+        replace(source, target)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "replace", crash)
+        with pytest.raises(Interruption):
+            run(tmp_path, checkpoint=tmp_path / "checkpoint", checkpoint_interval=0.0)
+    run(tmp_path, checkpoint=tmp_path / "checkpoint")
+    assert_same_files(tmp_path, undisturbed)
+
+
+def interrupt_at(step):
+    def interrupt(done, total):
+        if done == step:
+            raise Interruption
+
+    return interrupt
+
+
+# Half of the records is less than either state stands on: such a run begins anew.
+@pytest.mark.parametrize(
+    ("damaged", "resumed"), [("state.npz", 10), ("frames.bin", 0), ("series.bin", 0)]
+)
+def test_run_with_a_damaged_checkpoint_goes_on_to_the_same_bits(
+    tmp_path, undisturbed, damaged, resumed
+):
+    checkpoint = tmp_path / "checkpoint"
+    with pytest.raises(Interruption):
+        run(tmp_path, checkpoint=checkpoint, checkpoint_interval=0.0, progress=interrupt_at(11))
+    with open(checkpoint / damaged, "r+b") as file:
+        file.truncate(file.seek(0, os.SEEK_END) // 2)
+    steps = []
+    run(tmp_path, checkpoint=checkpoint, progress=lambda done, total: steps.append(done))
+    assert steps[0] == resumed
+    assert_same_files(tmp_path, undisturbed)
+
+
+def test_terminated_run_saves_its_state_and_goes_on_to_the_same_bits(tmp_path, undisturbed):
+    checkpoint = tmp_path / "checkpoint"
+
+    def terminate(done, total):
+        if done == 8:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    with pytest.raises(SystemExit, match="after step 9 of 20"):
+        run(tmp_path, checkpoint=checkpoint, progress=terminate)
+    assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+    steps = []
+    run(tmp_path, checkpoint=checkpoint, progress=lambda done, total: steps.append(done))
+    assert steps[0] == 9
+    assert_same_files(tmp_path, undisturbed)
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"step": 0.05}, "step is 0.05, there 0.1"),
+        ({"seed": 2}, "seed is 2, there 1"),
+        ({"model": ConstantDrag(0.7)}, "model is 'constant', there 'rotne_prager'"),
+        ({"properties": Properties(viscosity=1e-5)}, "viscosity"),
+    ],
+)
+def test_checkpoint_of_other_settings_is_refused_by_name(tmp_path, change, named):
+    checkpoint = tmp_path / "checkpoint"
+    with pytest.raises(Interruption):
+        run(tmp_path, checkpoint=checkpoint, checkpoint_interval=0.0, progress=interrupt_at(3))
+    with pytest.raises(ValueError, match=named):
+        run(tmp_path, **{"checkpoint": checkpoint} | change)
+
+
+def test_a_failed_run_leaves_nothing_behind(tmp_path):
+    with pytest.raises(Interruption):
+        run(tmp_path, progress=interrupt_at(3))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_foreign_files_in_the_checkpoint_folder_stay(tmp_path):
+    checkpoint = tmp_path / "checkpoint"
+    checkpoint.mkdir()
+    (checkpoint / "notes.txt").write_text("mine")
+    run(tmp_path, checkpoint=checkpoint)
+    assert [path.name for path in checkpoint.iterdir()] == ["notes.txt"]
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"step": 0.0}, "step is 0.0"),
+        ({"duration": 0.55, "save_interval": 0.1}, "duration is 0.55"),
+        ({"save_interval": 0.25}, "save_interval is 0.25"),
+        ({"start": "flying"}, "start is 'flying'"),
+        ({"precision": "float16"}, "precision is 'float16'"),
+        ({"particles": 5}, "5 particles"),
+        ({"volume_fraction": 0.6}, "phi is 0.6"),
+        ({"positions": np.zeros((7, 3))}, r"\(7, 3\)"),
+    ],
+)
+def test_settings_out_of_range_are_refused_by_name(tmp_path, change, named):
+    with pytest.raises(ValueError, match=named):
+        run(tmp_path, **change)
