@@ -1,0 +1,58 @@
+"""Numbers of others that the figures show beside ours, each with its source."""
+
+import numpy as np
+import pandas as pd
+
+PAPER_MESH_STUDY = pd.DataFrame(
+    {
+        "nodes": [212.04, 346.16, 547.91, 827.11, 1088.37, 1506.72],
+        "force": [10.0435, 17.5225, 19.8189, 22.1898, 23.2453, 24.3809],
+    }
+)
+"""Force on an isolated sphere [Re_p c_D] against the nodes of sphere and outer sphere together
+(paper, figure of the mesh validation study, read from the points that its source lists)."""
+
+PAPER_STEADY_STATE = pd.DataFrame(
+    {
+        "volume_fraction": [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8],
+        "value": [1.39, 1.18, 1.08, 1.015, 1.015, 1.015],
+        "low": [np.nan, np.nan, np.nan, 1.01, 1.01, 1.01],
+        "high": [np.nan, np.nan, np.nan, 1.02, 1.02, 1.02],
+    }
+)
+"""Settling velocity in units of the Stokes velocity in the steady state (paper, figures of
+1/beta against phi and of the Voronoï variance; at and below 1e-6 it states a range)."""
+
+RANDOM_START = pd.DataFrame(
+    {
+        "volume_fraction": [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8],
+        "value": [1.458, 1.204, 1.094, 1.043, 1.020, 1.009],
+    }
+)
+"""Mean of 1/beta over 3,000 random (Poisson) five-neighbour environments with the drag of the
+inverted Rotne-Prager mobility of the six spheres."""
+
+BATCHELOR_COEFFICIENT = -6.55
+"""Settling velocity of a dilute random suspension is 1 + this times phi (Batchelor 1972)."""
+
+POISSON_VORONOI_VARIANCE = 0.179032
+"""Variance of V/mean(V) of the Voronoï cells of random points (integral of Gilbert 1962)."""
+
+PAPER_GAMMA = (5.0, 0.2)
+"""Shape k and scale theta of the gamma law of the paper; k = (3 d + 1)/2 in d = 3 dimensions
+(Ferenc & Néda 2007). Its variance, k theta^2 = 0.2, is larger than that of random points."""
+
+MATCHED_GAMMA = (1 / POISSON_VORONOI_VARIANCE, POISSON_VORONOI_VARIANCE)
+"""Gamma law with mean one and the variance of random points: k = 5.59."""
+
+PAPER_FORCE_SUMMARY = {
+    ("reduction_exceeded_by_30_percent", "streamwise"): 0.15,
+    ("reduction_exceeded_by_10_percent", "streamwise"): 0.34,
+    ("share_15_percent_below_stokes", "streamwise"): 0.30,
+    ("share_34_percent_below_stokes", "streamwise"): 0.10,
+    ("mean", "spanwise"): 0.0,
+    ("mean", "vertical"): 0.0,
+    ("variance", "spanwise"): 0.126,
+    ("variance", "vertical"): 0.124,
+}
+"""What the paper states of its 14,000 forces (section "Interpretation of the BEM results")."""

@@ -1,0 +1,188 @@
+"""Spectra of velocity fluctuations in time, turned into wavenumber, and their slope."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from scipy import signal, special
+
+from dustfall.analysis.settling import case_of, from_time
+
+METHODS = ("periodogram", "welch")
+
+BINS_PER_DECADE = 20
+
+
+@dataclass(frozen=True)
+class PowerLaw:
+    """E = exp(intercept) kappa^slope, with the standard error of the slope."""
+
+    slope: float
+    standard_error: float
+    intercept: float
+
+    def __call__(self, kappa):
+        return np.exp(self.intercept) * np.asarray(kappa) ** self.slope
+
+
+def power_spectral_density(
+    values, interval, method="periodogram", window="boxcar", segment=None
+) -> tuple[np.ndarray, np.ndarray]:
+    """One-sided power spectral density of an evenly sampled series about its mean.
+
+    Parameters: `values` (m,), `interval` between samples, `method` "periodogram" or "welch"
+    (halved overlap, Hann unless `window` says otherwise), `segment` the samples of a Welch segment
+    (default m/8). Returns the frequencies f >= 0 [1/unit of interval] and the density
+    [unit of values squared times unit of interval].
+
+    Parseval: for the plain periodogram sum(density) * f[1] is the variance to rounding, for odd
+    and even m. A boxcar leaks the jump between last and first value as f^-2 into high frequencies,
+    which looks like a power law; a Hann window does not.
+
+    Raises ValueError for an unknown method, fewer than four values, values that are not finite,
+    or an interval or a segment out of range.
+    """
+    x = np.asarray(values, dtype=float)
+    if x.ndim != 1 or x.size < 4:
+        raise ValueError(f"a series of shape {x.shape} has no spectrum; at least 4 values")
+    if not np.isfinite(x).all():
+        raise ValueError(f"value {int(np.flatnonzero(~np.isfinite(x))[0])} is not finite")
+    if not (np.isfinite(interval) and interval > 0):
+        raise ValueError(f"the sampling interval is {interval}; it must be above zero")
+    if method not in METHODS:
+        raise ValueError(f"the method is {method!r}; allowed: {', '.join(METHODS)}")
+    x = x - x.mean()
+    if method == "periodogram":
+        return signal.periodogram(x, 1 / interval, window=window, detrend=False)
+    segment = max(4, x.size // 8) if segment is None else segment
+    if not 4 <= segment <= x.size:
+        raise ValueError(f"a Welch segment has {segment} samples; allowed: 4 to {x.size}")
+    window = "hann" if window == "boxcar" else window
+    return signal.welch(x, 1 / interval, window=window, nperseg=segment, detrend=False)
+
+
+def energy_spectrum(
+    velocity, interval, stokes_number=1.0, **settings
+) -> tuple[np.ndarray, np.ndarray]:
+    """Energy spectrum E(kappa) of one particle's settling velocity.
+
+    kappa = 2 pi f / mean v and E = PSD mean v / (2 pi) (paper, section "Mineral dust
+    sedimentation"). Parameters: `velocity` (m,) [v_s], `interval` [tau], `stokes_number`
+    = v_s tau / d_p, `settings` of `power_spectral_density`. Returns kappa > 0 [1/d_p] and
+    E [v_s^2 d_p]; sum(E) dkappa is the variance.
+
+    Raises ValueError for a particle that does not settle (mean velocity not above zero).
+    """
+    mean = float(np.mean(velocity)) * stokes_number
+    if not mean > 0:
+        raise ValueError(f"the mean settling velocity is {mean}; kappa needs one above zero")
+    frequency, density = power_spectral_density(velocity, interval, **settings)
+    kappa = 2 * np.pi * frequency / mean
+    return kappa[1:], density[1:] * mean / (2 * np.pi)
+
+
+def averaged_in_bins(kappa, energy, bins_per_decade=BINS_PER_DECADE) -> pd.DataFrame:
+    """Average a spectrum in bins of equal width on the logarithmic axis.
+
+    Returns the columns kappa (geometric mean), energy (mean) and ordinates (their number) of the
+    bins that hold any.
+    """
+    kappa, energy = np.asarray(kappa, dtype=float), np.asarray(energy, dtype=float)
+    number = np.floor(np.log10(kappa / kappa[0]) * bins_per_decade + 1e-9).astype(int)
+    groups = pd.DataFrame({"kappa": np.log(kappa), "energy": energy}).groupby(number)
+    table = groups.agg(kappa=("kappa", "mean"), energy=("energy", "mean"))
+    table["kappa"] = np.exp(table["kappa"])
+    return table.assign(ordinates=groups.size()).reset_index(drop=True)
+
+
+def spectral_slope(kappa, energy, ordinates=None, limits=(0.0, np.inf)) -> PowerLaw:
+    """Fit a power law to a spectrum by weighted least squares in log-log coordinates.
+
+    Parameters: `kappa` and `energy` (m,); `ordinates` (m,), how many periodogram ordinates each
+    value averages (default one); `limits` of kappa, inclusive. The logarithm of the mean of j
+    ordinates of a random process is biased by psi(j) - ln j and has the variance psi'(j); the
+    weights are these variances' inverses, and the standard error is scaled by the scatter found.
+
+    Raises ValueError where fewer than three positive values lie inside the limits.
+    """
+    kappa, energy = np.asarray(kappa, dtype=float), np.asarray(energy, dtype=float)
+    count = np.ones_like(kappa) if ordinates is None else np.asarray(ordinates, dtype=float)
+    inside = (kappa > 0) & (energy > 0) & (kappa >= limits[0]) & (kappa <= limits[1])
+    if inside.sum() < 3:
+        raise ValueError(
+            f"{inside.sum()} positive values of the spectrum lie between kappa = {limits[0]} and "
+            f"{limits[1]}; a slope needs at least 3"
+        )
+    count = count[inside]
+    x = np.log(kappa[inside])
+    y = np.log(energy[inside]) - special.digamma(count) + np.log(count)
+    weight = 1 / special.polygamma(1, count)
+    centre = np.average(x, weights=weight)
+    spread = np.sum(weight * (x - centre) ** 2)
+    level = np.average(y, weights=weight)
+    slope = np.sum(weight * (x - centre) * y) / spread
+    scatter = np.sum(weight * (y - level - slope * (x - centre)) ** 2) / (len(x) - 2)
+    return PowerLaw(float(slope), float(np.sqrt(scatter / spread)), float(level - slope * centre))
+
+
+def phase_and_spectra(
+    runs: list[xr.Dataset], start: float, fit_frequencies=(0.0, np.inf), points=1000, **settings
+) -> pd.DataFrame:
+    """Tabulate the phase diagram and the energy spectrum of each run's tracked particles.
+
+    Parameters: `runs`, series datasets (tracked_velocity [v_s] and tracked_force [weight minus
+    buoyancy], both (step, tracked, spatial), gravity along -z; attribute stokes_number); `start`
+    of the statistics [tau]; `fit_frequencies`, limits [1/tau] of the slope's fit, of which the
+    upper is held at half the Nyquist frequency (above it aliasing bends the spectrum); `points`,
+    the most rows of a phase diagram; `settings` of `power_spectral_density`.
+
+    Returns the columns panel ("phase", "spectrum" or "fit"), volume_fraction, n, particle (from
+    1), x, y, slope, slope_error. Phase: x = v_s/v_s,Stokes, y = F_d/(F_g - F_b). Spectrum: x =
+    kappa [1/d_p], y = E [v_s^2 d_p], averaged in bins. Fit: the two ends of the fitted line.
+    A particle whose velocity never changes has a phase point and no spectrum.
+
+    Raises ValueError for no run, uneven time steps or too short a run.
+    """
+    tables = []
+    for run in runs:
+        part = from_time(run, start, "step")
+        time = part["time"].values.astype(float)
+        if len(time) < 4:
+            raise ValueError(f"{len(time)} steps lie after {start} tau; a spectrum needs 4")
+        interval = (time[-1] - time[0]) / (len(time) - 1)
+        if not np.allclose(np.diff(time), interval, rtol=1e-3):
+            raise ValueError("the time steps of the series are uneven: no spectrum")
+        if "stokes_number" not in run.attrs:
+            raise ValueError("the dataset lacks the attribute 'stokes_number'")
+        stokes_number = float(run.attrs["stokes_number"])
+        velocity, drag = (
+            part[name].transpose("step", "tracked", "spatial").values[:, :, 2].astype(float)
+            for name in ("tracked_velocity", "tracked_force")
+        )
+        case = case_of(run)
+        kept = np.unique(np.linspace(0, len(time) - 1, min(points, len(time))).round().astype(int))
+        for i in range(velocity.shape[1]):
+            settling = -velocity[:, i]
+            head = {k: case[k] for k in ("volume_fraction", "n")} | {"particle": i + 1}
+            phase = {"panel": "phase", "x": settling[kept], "y": drag[kept, i]}
+            tables.append(pd.DataFrame(head | phase))
+            # A float32 series of an undisturbed particle differs by rounding alone.
+            if np.ptp(settling) <= 1e-6 * abs(settling.mean()):
+                continue
+            kappa, energy = energy_spectrum(settling, interval, stokes_number, **settings)
+            spectrum = averaged_in_bins(kappa, energy)
+            per_frequency = 2 * np.pi / (settling.mean() * stokes_number)
+            highest = min(fit_frequencies[1], 0.25 / interval)
+            limits = (fit_frequencies[0] * per_frequency, highest * per_frequency)
+            law = spectral_slope(*(spectrum[c] for c in spectrum), limits=limits)
+            found = {"slope": law.slope, "slope_error": law.standard_error}
+            curve = {"panel": "spectrum", "x": spectrum["kappa"], "y": spectrum["energy"]}
+            tables.append(pd.DataFrame(head | curve | found))
+            ends = np.clip(limits, spectrum["kappa"].min(), spectrum["kappa"].max())
+            tables.append(pd.DataFrame(head | {"panel": "fit", "x": ends, "y": law(ends)} | found))
+    if not tables:
+        raise ValueError("there are no runs: at least one series is needed")
+    table = pd.concat(tables, ignore_index=True)
+    columns = ["panel", "volume_fraction", "n", "particle", "x", "y", "slope", "slope_error"]
+    return table.reindex(columns=columns)

@@ -1,0 +1,27 @@
+"""One function a figure, from the tidy table that is saved beside it to a matplotlib Figure."""
+
+from dustfall.figures.forces import force_pdf, force_scatter, predicted_vs_target, spearman
+from dustfall.figures.mesh import mesh_study
+from dustfall.figures.settling import (
+    inverse_beta,
+    phase_and_spectra,
+    settling_in_time,
+    trajectories,
+)
+from dustfall.figures.style import save
+from dustfall.figures.voronoi import voronoi_pdf, voronoi_variance
+
+__all__ = [
+    "force_pdf",
+    "force_scatter",
+    "inverse_beta",
+    "mesh_study",
+    "phase_and_spectra",
+    "predicted_vs_target",
+    "save",
+    "settling_in_time",
+    "spearman",
+    "trajectories",
+    "voronoi_pdf",
+    "voronoi_variance",
+]

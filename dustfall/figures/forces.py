@@ -1,0 +1,255 @@
+"""Figures of the data set and of the force models."""
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+
+from dustfall import STOKES_DRAG
+from dustfall.figures.style import (
+    CATEGORY_COLOURS,
+    COMPONENT_COLOURS,
+    DOUBLE,
+    letter,
+    new_figure,
+    phi_colour,
+    require,
+    require_components,
+    styled,
+)
+
+FORCE_UNIT = r"[$\mathrm{Re}_p c_D$]"
+
+LINES = {"radial": "-", "azimuthal": ":", "polar": "--"} | {
+    "spanwise": ":",
+    "streamwise": "-",
+    "vertical": "--",
+}
+
+
+@styled
+def force_scatter(frame: pd.DataFrame) -> Figure:
+    """Force components against volume fraction, one panel each; Stokes drag as a line.
+
+    `frame`: volume_fraction, component, force, as `analysis.distributions.force_samples` gives.
+    Raises ValueError for a missing column or an empty table.
+    """
+    require(frame, ["volume_fraction", "component", "force"], "force_scatter")
+    symbols = {"spanwise": "x", "streamwise": "y", "vertical": "z"}
+    require_components(frame, symbols, "force_scatter")
+    figure = new_figure(DOUBLE, 2.5)
+    axes = figure.subplots(1, 3)
+    lateral = frame.loc[frame["component"] != "streamwise", "force"].abs().max()
+    reach = 1.08 * lateral if lateral > 0 else 1.0
+    for ax, component in zip(axes, symbols, strict=True):
+        rows = frame[frame["component"] == component]
+        colour = COMPONENT_COLOURS[component]
+        ax.scatter(
+            rows["volume_fraction"], rows["force"], s=4, color=colour, alpha=0.55, linewidths=0
+        )
+        ax.set_xscale("log")
+        ax.set_xlabel(r"volume fraction $\varphi$")
+        ax.set_ylabel(f"{component} force $F_{symbols[component]}$ {FORCE_UNIT}")
+        if component == "streamwise":
+            ax.axhline(STOKES_DRAG, color="k", lw=0.9)
+            ax.annotate(
+                "Stokes, 24",
+                (0.03, STOKES_DRAG),
+                (0, 3),
+                xycoords=("axes fraction", "data"),
+                textcoords="offset points",
+                fontsize=8,
+            )
+            bottom = min(rows["force"].min(), STOKES_DRAG - 1)
+            ax.yaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
+            ax.set_ylim(bottom - 0.5, STOKES_DRAG + 0.09 * (STOKES_DRAG - bottom))
+        else:
+            ax.axhline(0, color="k", lw=0.9)
+            ax.set_ylim(-reach, reach)
+    letter(axes)
+    return figure
+
+
+@styled
+def force_pdf(frame: pd.DataFrame) -> Figure:
+    """P.d.f. of the force per decade of volume fraction: streamwise left, lateral right.
+
+    `frame`: component, phi_low, phi_high, samples, force, density, laplace_density, laplace_ks, as
+    `analysis.distributions.force_distributions` gives. Each decade is a ridge with its own height;
+    the number on it is its highest density. Dashed on the right: the fitted Laplace law.
+    Raises ValueError for a missing column or fewer than two rows.
+    """
+    columns = ["component", "phi_low", "phi_high", "force", "density"]
+    require(frame, [*columns, "laplace_density", "laplace_ks"], "force_pdf", fewest=2)
+    require_components(frame, ["streamwise", "spanwise", "vertical"], "force_pdf")
+    decades = sorted(frame["phi_low"].unique())
+    figure = new_figure(DOUBLE, 1.3 + 0.55 * len(decades))
+    axes = figure.subplots(1, 2, sharey=True)
+    panels = {"streamwise": ["streamwise"], "lateral": ["spanwise", "vertical"]}
+    height = 1.35
+    for ax, (panel, components) in zip(axes, panels.items(), strict=True):
+        part = frame[frame["component"].isin(components)]
+        margin = 0.02 * np.ptp(part["force"])
+        left, right = part["force"].min() - margin, part["force"].max() + margin
+        if panel == "lateral":
+            # Room for the notes, which the wide tails would run through.
+            left -= 0.3 * (right - left)
+        for level in reversed(range(len(decades))):
+            rows = part[part["phi_low"] == decades[level]]
+            peak = rows["density"].max()
+            scale = height / np.fmax(peak, rows["laplace_density"].max())
+            colour = phi_colour(np.sqrt(rows["phi_low"].iloc[0] * rows["phi_high"].iloc[0]))
+            order = 10 - level
+            ax.axhline(level, color="0.6", lw=0.4, zorder=order)
+            for component, line in zip(components, ("-", (0, (4, 1))), strict=False):
+                curve = rows[rows["component"] == component]
+                x, y = curve["force"], level + scale * curve["density"]
+                if component == components[0]:
+                    ax.fill_between(x, level, y, color=colour, alpha=0.45, lw=0, zorder=order)
+                ax.plot(x, y, color=COMPONENT_COLOURS[component], ls=line, lw=0.9, zorder=order)
+            note = f"peak {peak:.2g}"
+            if panel == "lateral":
+                curve = rows[rows["component"] == components[0]]
+                y = level + scale * curve["laplace_density"]
+                ax.plot(curve["force"], y, color="k", ls=":", lw=0.9, zorder=order)
+                note += f"\nKS {curve['laplace_ks'].iloc[0]:.2g}"
+            ax.annotate(
+                note,
+                (0.015, level),
+                (0, 3),
+                xycoords=("axes fraction", "data"),
+                textcoords="offset points",
+                fontsize=7,
+                zorder=20,
+            )
+        ax.set_xlim(left, right)
+        ticks = MaxNLocator(nbins=6, steps=[1, 2, 5, 10]).tick_values(
+            *part["force"].agg(["min", "max"])
+        )
+        ax.set_xticks([t for t in ticks if part["force"].min() <= t <= right])
+        ax.set_xlabel(f"{panel} force {FORCE_UNIT}")
+    axes[0].axvline(STOKES_DRAG, color="k", lw=0.8, ls="--", zorder=0)
+    axes[0].set_yticks(range(len(decades)))
+    exponents = [round(np.log10(low)) for low in decades]
+    axes[0].set_yticklabels([f"$10^{{{e}}}$ to $10^{{{e + 1}}}$" for e in exponents])
+    axes[0].set_ylabel(r"p.d.f. in each decade of $\varphi$, each to its own peak")
+    axes[0].set_ylim(-0.15, len(decades) - 1 + height + 0.25)
+    axes[0].tick_params(axis="y", length=0)
+    axes[1].tick_params(axis="y", length=0)
+    handles = [
+        Line2D([], [], color=COMPONENT_COLOURS["streamwise"], label="streamwise"),
+        Line2D([], [], color=COMPONENT_COLOURS["spanwise"], label="spanwise"),
+        Line2D([], [], color=COMPONENT_COLOURS["vertical"], ls=(0, (4, 1)), label="vertical"),
+        Line2D([], [], color="k", ls=":", label="fitted Laplace law"),
+        Line2D([], [], color="k", ls="--", lw=0.8, label="Stokes, 24"),
+    ]
+    figure.legend(handles=handles, loc="outside upper center", ncols=5)
+    letter(axes)
+    return figure
+
+
+@styled
+def spearman(frame: pd.DataFrame) -> Figure:
+    """Spearman correlation of coordinates with forces against the number of neighbours.
+
+    `frame`: coordinate, component, neighbours, rho, noise, as
+    `analysis.correlations.spearman_by_neighbours` gives for one kind of coordinates. The grey band
+    is what independent data of this size would show. Raises ValueError for a missing column, an
+    empty table or several kinds of coordinates.
+    """
+    require(
+        frame, ["coordinates", "coordinate", "component", "neighbours", "rho", "noise"], "spearman"
+    )
+    if frame["coordinates"].nunique() != 1:
+        raise ValueError(
+            f"spearman draws one kind of coordinates, not {frame['coordinates'].unique().tolist()}"
+        )
+    names = frame["coordinate"].unique()
+    figure = new_figure(DOUBLE, 3.0)
+    axes = figure.subplots(1, 2)
+    panels = [["streamwise"], ["spanwise", "vertical"]]
+    for ax, components in zip(axes, panels, strict=True):
+        for component in components:
+            for name in names:
+                rows = frame[(frame["component"] == component) & (frame["coordinate"] == name)]
+                ax.plot(
+                    rows["neighbours"],
+                    rows["rho"],
+                    color=COMPONENT_COLOURS[component],
+                    ls=LINES[name],
+                    marker="o" if component != "vertical" else "s",
+                    ms=3,
+                )
+        ax.axhspan(0, frame["noise"].max(), color="0.85", lw=0, zorder=0)
+        ax.set_ylim(0, 1.12 * frame.loc[frame["component"].isin(components), "rho"].max())
+        ax.set_xticks(sorted(frame["neighbours"].unique()))
+        ax.tick_params(axis="x", which="minor", length=0)
+        ax.set_xlabel("number of closest neighbours")
+        ax.set_ylabel(r"mean $|\rho_\mathrm{Spearman}|$")
+    symbols = {"radial": "$r$", "azimuthal": r"$\phi$", "polar": r"$\theta$"}
+    handles = [
+        Line2D([], [], color="k", ls=LINES[name], label=f"{name} {symbols.get(name, '')}".strip())
+        for name in names
+    ]
+    handles += [
+        Line2D([], [], color=COMPONENT_COLOURS[c], marker=m, ms=3, label=f"{c} force")
+        for c, m in {"streamwise": "o", "spanwise": "o", "vertical": "s"}.items()
+    ]
+    handles.append(Line2D([], [], color="0.85", lw=5, label="independent data"))
+    figure.legend(handles=handles, loc="outside upper center", ncols=4)
+    letter(axes)
+    return figure
+
+
+@styled
+def predicted_vs_target(frame: pd.DataFrame) -> Figure:
+    """Predicted against target force of each model: streamwise above, lateral below.
+
+    `frame`: model, component, target, predicted, r2, as
+    `analysis.correlations.predictions_against_target` gives; one column of panels a model, in the
+    order of the table. Raises ValueError for a missing column or an empty table.
+    """
+    require(frame, ["model", "component", "target", "predicted", "r2"], "predicted_vs_target")
+    require_components(frame, ["streamwise", "lateral"], "predicted_vs_target")
+    models = frame["model"].unique()
+    figure = new_figure(min(DOUBLE, 0.6 + 2.2 * len(models)), 4.6 if len(models) < 4 else 3.6)
+    axes = figure.subplots(2, len(models), squeeze=False, sharex="row", sharey="row")
+    for row, component in enumerate(("streamwise", "lateral")):
+        part = frame[frame["component"] == component]
+        margin = 0.05 * np.ptp(part["target"]) or 1.0
+        low, high = part["target"].min() - margin, part["target"].max() + margin
+        for column, model in enumerate(models):
+            ax = axes[row, column]
+            rows = part[part["model"] == model]
+            ax.plot([low, high], [low, high], color="k", lw=0.8, zorder=3)
+            ax.scatter(
+                rows["target"],
+                rows["predicted"],
+                s=4,
+                color=CATEGORY_COLOURS[column % len(CATEGORY_COLOURS)],
+                alpha=0.5,
+                linewidths=0,
+            )
+            ax.set_xlim(low, high)
+            ax.set_ylim(low, high)
+            ax.set_aspect("equal")
+            for axis in (ax.xaxis, ax.yaxis):
+                axis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+            if not rows.empty:
+                ax.text(0.05, 0.9, determination(rows["r2"].iloc[0]), transform=ax.transAxes)
+            outside = ((rows["predicted"] < low) | (rows["predicted"] > high)).sum()
+            if outside:
+                note = f"{outside} of {len(rows)} points outside"
+                ax.text(0.95, 0.05, note, transform=ax.transAxes, ha="right", fontsize=7)
+            if row == 0:
+                ax.set_title(model)
+            ax.set_xlabel(f"target {component} force {FORCE_UNIT}")
+        axes[row, 0].set_ylabel(f"predicted {FORCE_UNIT}")
+    return figure
+
+
+def determination(r2: float) -> str:
+    """R^2 with as many digits as tell it from one."""
+    digits = 3 if r2 >= 1 or r2 < 0.99 else int(np.ceil(-np.log10(1 - r2))) + 1
+    return f"$R^2 = {r2:.{min(digits, 7)}f}$"

@@ -1,0 +1,61 @@
+"""Figure of the mesh study."""
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from dustfall import STOKES_DRAG
+from dustfall.analysis.mesh_study import PAPER
+from dustfall.figures.style import (
+    CATEGORY_COLOURS,
+    DOUBLE,
+    MARKERS,
+    REFERENCE,
+    letter,
+    new_figure,
+    require,
+    styled,
+)
+
+
+@styled
+def mesh_study(frame: pd.DataFrame) -> Figure:
+    """Drag on an isolated sphere against nodes: force left, relative error and order right.
+
+    `frame`: scheme, nodes, force, error, order, as `analysis.mesh_study.mesh_study_table` gives,
+    the paper's points among them. Raises ValueError for a missing column or an empty table.
+    """
+    require(frame, ["scheme", "nodes", "force", "error", "order"], "mesh_study")
+    figure = new_figure(DOUBLE, 3.0)
+    left, right = figure.subplots(1, 2)
+    schemes = [s for s in frame["scheme"].unique() if s != PAPER]
+    looks = {
+        s: {"color": CATEGORY_COLOURS[i % len(CATEGORY_COLOURS)], "marker": MARKERS[i % 7]}
+        for i, s in enumerate(schemes)
+    }
+    looks[PAPER] = {"color": REFERENCE, "marker": "*", "ms": 6, "ls": ":"}
+    for scheme, look in looks.items():
+        rows = frame[frame["scheme"] == scheme].sort_values("nodes")
+        if rows.empty:
+            continue
+        left.plot(rows["nodes"], rows["force"], **look)
+        order = rows["order"].iloc[0]
+        name = "paper (sphere and outer sphere)" if scheme == PAPER else scheme
+        label = name if np.isnan(order) else f"{name}, order {order:.1f}"
+        shown = rows[rows["error"] > 0]
+        right.plot(shown["nodes"], shown["error"], label=label, **look)
+    exact = left.axhline(STOKES_DRAG, color="k", lw=0.8, ls="--", zorder=0, label="exact, 24")
+    left.set_xscale("log")
+    left.set_xlabel("number of nodes")
+    left.set_ylabel(r"force on an isolated sphere [$\mathrm{Re}_p c_D$]")
+    left.set_ylim(frame["force"].min() - 1, max(frame["force"].max(), STOKES_DRAG) + 1.2)
+    right.set_xscale("log")
+    right.set_yscale("log")
+    right.set_xlabel("number of nodes")
+    right.set_ylabel(r"relative error $|F/24 - 1|$")
+    left.yaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
+    handles = [*right.get_legend_handles_labels()[0], exact]
+    figure.legend(handles=handles, loc="outside upper center", ncols=2)
+    letter((left, right))
+    return figure

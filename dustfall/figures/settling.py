@@ -1,0 +1,224 @@
+"""Figures of the settling cloud: settling velocity, single particles, trajectories."""
+
+import numpy as np
+import pandas as pd
+from matplotlib.container import ErrorbarContainer
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+
+from dustfall.figures.style import (
+    CATEGORY_COLOURS,
+    DOUBLE,
+    MARKERS,
+    REFERENCE,
+    SINGLE,
+    new_figure,
+    phi_colour,
+    phi_label,
+    phi_legend,
+    require,
+    styled,
+)
+
+PARTICLE_COLOURS = ("#d55e00", "#009e73", "#0072b2")
+"""The paper's red, green and blue, in the set that the colour-blind can tell apart."""
+
+
+@styled
+def inverse_beta(frame: pd.DataFrame) -> Figure:
+    """Steady settling velocity against volume fraction for each n, beside what others have.
+
+    `frame`: source, model, n, volume_fraction, value, low, high, as
+    `analysis.settling.inverse_beta_table` gives. Raises ValueError for a missing column or a table
+    without simulations.
+    """
+    columns = ["source", "model", "n", "volume_fraction", "value", "low", "high"]
+    require(frame, columns, "inverse_beta")
+    simulation = frame[frame["source"] == "simulation"]
+    if simulation.empty:
+        raise ValueError("the table of inverse_beta has no rows of source 'simulation'")
+    figure = new_figure(1.4 * SINGLE, 3.4)
+    ax = figure.subplots()
+    several = simulation["model"].nunique() > 1
+    for m, (model, of_model) in enumerate(simulation.groupby("model")):
+        for i, (n, rows) in enumerate(of_model.groupby("n")):
+            rows = rows.sort_values("volume_fraction")
+            error = np.nan_to_num([rows["value"] - rows["low"], rows["high"] - rows["value"]])
+            label = f"$n = {int(n):,}$".replace(",", r"\,")
+            ax.errorbar(
+                rows["volume_fraction"],
+                rows["value"],
+                yerr=error,
+                color=CATEGORY_COLOURS[(m if several else i) % len(CATEGORY_COLOURS)],
+                marker=MARKERS[i % len(MARKERS)],
+                mfc="none",
+                ms=4 + 2 * i,
+                lw=0.9,
+                elinewidth=0.9,
+                capsize=2.5,
+                label=f"{model}, {label}" if several else label,
+                zorder=4 - 0.1 * i,
+            )
+    paper = frame[frame["source"] == "paper"]
+    ax.plot(
+        paper["volume_fraction"],
+        paper["value"],
+        ls="none",
+        marker="*",
+        ms=8,
+        color="k",
+        label="paper, steady state",
+        zorder=5,
+    )
+    ranges = paper.dropna(subset=["low", "high"])
+    ax.vlines(ranges["volume_fraction"], ranges["low"], ranges["high"], color="k", lw=0.9)
+    for source, line, label in (
+        ("random start", "--", r"random start, $\overline{1/\beta}$ (Rotne-Prager)"),
+        ("Batchelor 1972", ":", r"infinite suspension, $1 - 6.55\,\varphi$"),
+    ):
+        rows = frame[frame["source"] == source].sort_values("volume_fraction")
+        ax.plot(rows["volume_fraction"], rows["value"], color=REFERENCE, ls=line, label=label)
+    ax.set_xscale("log")
+    ax.set_xlabel(r"volume fraction $\varphi$")
+    ax.set_ylabel(r"$\langle v_s\rangle / v_{s,\mathrm{Stokes}} = 1/\beta$")
+    handles, labels = ax.get_legend_handles_labels()
+    ours = [i for i, handle in enumerate(handles) if isinstance(handle, ErrorbarContainer)]
+    others = [i for i in range(len(handles)) if i not in ours]
+    order = ours + others
+    ax.legend([handles[i] for i in order], [labels[i] for i in order], loc="upper left")
+    return figure
+
+
+@styled
+def settling_in_time(frame: pd.DataFrame) -> Figure:
+    """Mean (solid) and variance (dashed) over particles of the settling velocity in time.
+
+    `frame`: n, volume_fraction, time, mean, variance, as `analysis.settling.settling_in_time`
+    gives for one model; one column of panels for each n. Raises ValueError for a missing column,
+    several models or fewer than two rows.
+    """
+    columns = ["model", "n", "volume_fraction", "time", "mean", "variance"]
+    require(frame, columns, "settling_in_time", fewest=2)
+    if frame["model"].nunique() > 1:
+        raise ValueError(
+            f"settling_in_time draws one model, not {frame['model'].unique().tolist()}"
+        )
+    numbers = sorted(frame["n"].unique())
+    figure = new_figure(DOUBLE if len(numbers) > 1 else 1.3 * SINGLE, 4.2)
+    axes = figure.subplots(2, len(numbers), squeeze=False, sharex=True, sharey="row")
+    for column, n in enumerate(numbers):
+        upper, lower = axes[:, column]
+        for phi, rows in frame[frame["n"] == n].groupby("volume_fraction"):
+            rows = rows.sort_values("time")
+            upper.plot(rows["time"], rows["mean"], color=phi_colour(phi), lw=1)
+            # A start at rest has no variance, and a logarithmic axis no zero.
+            variance = rows["variance"].where(rows["variance"] > 0)
+            lower.plot(rows["time"], variance, color=phi_colour(phi), lw=1, ls=(0, (4, 1.2)))
+        upper.axhline(1, color=REFERENCE, lw=0.6, zorder=0)
+        upper.set_title(f"$n = {int(n):,}$".replace(",", r"\,"))
+        lower.set_yscale("log")
+        lower.set_xlabel(r"time $t/\tau$")
+    variance = frame["variance"][frame["variance"] > 0]
+    if not variance.empty:
+        axes[1, 0].set_ylim(0.5 * variance.quantile(0.01), 2 * variance.max())
+    axes[0, 0].set_ylabel(r"mean $\langle v_s\rangle^{p} / v_{s,\mathrm{Stokes}}$")
+    axes[1, 0].set_ylabel(r"variance $\mathrm{var}^{p}(v_s) / v_{s,\mathrm{Stokes}}^2$")
+    phi_legend(figure, frame["volume_fraction"])
+    return figure
+
+
+@styled
+def phase_and_spectra(frame: pd.DataFrame) -> Figure:
+    """Phase diagram (left) and energy spectrum (right) of each tracked particle, one a row.
+
+    `frame`: panel, volume_fraction, particle, x, y, slope, slope_error, as
+    `analysis.spectra.phase_and_spectra` gives for one n. The slope written in a panel is that of
+    the densest case. Raises ValueError for a missing column, several n or fewer than two rows.
+    """
+    columns = ["panel", "volume_fraction", "n", "particle", "x", "y", "slope", "slope_error"]
+    require(frame, columns, "phase_and_spectra", fewest=2)
+    if frame["n"].nunique() > 1:
+        raise ValueError(f"phase_and_spectra draws one n, not {frame['n'].unique().tolist()}")
+    particles = sorted(frame["particle"].unique())
+    figure = new_figure(DOUBLE, 0.6 + 2.1 * len(particles))
+    axes = figure.subplots(len(particles), 2, squeeze=False, sharex="col", sharey="col")
+    for row, particle in enumerate(particles):
+        left, right = axes[row]
+        part = frame[frame["particle"] == particle]
+        for phi, rows in sorted(part.groupby("volume_fraction"), reverse=True):
+            colour = phi_colour(phi)
+            phase, spectrum, fit = (rows[rows["panel"] == p] for p in ("phase", "spectrum", "fit"))
+            left.plot(phase["x"], phase["y"], color=colour, lw=0.7)
+            # A dilute orbit is smaller than a line is wide: its last point shows where it is.
+            left.plot(phase["x"].iloc[-1:], phase["y"].iloc[-1:], color=colour, marker="o", ms=2.5)
+            right.plot(spectrum["x"], spectrum["y"], color=colour, lw=0.9)
+            right.plot(fit["x"], fit["y"], color="k", lw=0.6, ls="--", zorder=5)
+        fits = part[part["panel"] == "fit"]
+        if not fits.empty:
+            densest = fits.sort_values("volume_fraction").iloc[-1]
+            note = (
+                f"slope at $\\varphi = ${phi_label(densest['volume_fraction'])}: "
+                f"${densest['slope']:.2f} \\pm {densest['slope_error']:.2f}$"
+            )
+            right.text(0.04, 0.06, note, transform=right.transAxes, fontsize=8)
+        left.axhline(1, color=REFERENCE, lw=0.5, zorder=0)
+        left.axvline(1, color=REFERENCE, lw=0.5, zorder=0)
+        left.set_ylabel(r"$F_d / (F_g - F_b)$")
+        left.set_title(f"particle {particle}", loc="left", fontsize=8, pad=3)
+        right.set_xscale("log")
+        right.set_yscale("log")
+        right.set_ylabel(r"$E(\kappa)\;[v_{s,\mathrm{Stokes}}^2\, d_p]$")
+    axes[-1, 0].set_xlabel(r"$v_s / v_{s,\mathrm{Stokes}}$")
+    axes[-1, 1].set_xlabel(r"wavenumber $\kappa\;[1/d_p]$")
+    phi_legend(figure, frame["volume_fraction"])
+    return figure
+
+
+@styled
+def trajectories(frame: pd.DataFrame) -> Figure:
+    """Paths of the tracked particles from their starts: side view above, top view below.
+
+    `frame`: volume_fraction, n, particle, dx, dy, dz, as `analysis.settling.tracked_trajectories`
+    gives for one n; one column of panels a volume fraction. The side views share one scale, so
+    that the paths' growing unrest shows; each top view has its own. Raises ValueError for a
+    missing column, several n or fewer than two rows.
+    """
+    columns = ["volume_fraction", "n", "particle", "dx", "dy", "dz"]
+    require(frame, columns, "trajectories", fewest=2)
+    if frame["n"].nunique() > 1:
+        raise ValueError(f"trajectories draws one n, not {frame['n'].unique().tolist()}")
+    phis = sorted(frame["volume_fraction"].unique())
+    figure = new_figure(DOUBLE if len(phis) > 2 else SINGLE, 5.2)
+    axes = figure.subplots(2, len(phis), squeeze=False, height_ratios=[3, 1])
+    side = 1.1 * frame["dx"].abs().max() or 1.0
+    for column, phi in enumerate(phis):
+        above, below = axes[:, column]
+        rows = frame[frame["volume_fraction"] == phi]
+        for i, (_, path) in enumerate(rows.groupby("particle")):
+            colour = PARTICLE_COLOURS[i % len(PARTICLE_COLOURS)]
+            above.plot(path["dx"], path["dz"], color=colour, lw=1)
+            below.plot(path["dx"], path["dy"], color=colour, lw=0.9)
+            below.plot(path["dx"].iloc[-1:], path["dy"].iloc[-1:], color=colour, marker="o", ms=2.5)
+        below.plot(0, 0, color="k", marker="+", ms=5, mew=0.8)
+        above.set_title(f"$\\varphi = ${phi_label(phi)}")
+        above.set_xlim(-side, side)
+        above.set_ylim(1.03 * frame["dz"].min(), max(0.0, frame["dz"].max()))
+        reach = 1.15 * rows[["dx", "dy"]].abs().to_numpy().max() or 1.0
+        below.set_xlim(-reach, reach)
+        below.set_ylim(-reach, reach)
+        below.set_aspect("equal")
+        for ax in (above, below):
+            ax.xaxis.set_major_locator(MaxNLocator(3, symmetric=True))
+        below.yaxis.set_major_locator(MaxNLocator(3, symmetric=True))
+        below.set_xlabel("$x - x_0$ [$d_p$]")
+        if column:
+            above.set_yticklabels([])
+    axes[0, 0].set_ylabel("side view: $z - z_0$ [$d_p$]")
+    axes[1, 0].set_ylabel("top view: $y - y_0$ [$d_p$]")
+    handles = [
+        Line2D([], [], color=PARTICLE_COLOURS[i % len(PARTICLE_COLOURS)], label=f"particle {p}")
+        for i, p in enumerate(sorted(frame["particle"].unique()))
+    ]
+    figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))
+    return figure

@@ -1,0 +1,157 @@
+"""The look of all figures, and how they are saved."""
+
+import functools
+from collections.abc import Callable, Iterable, Sequence
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from dustfall.files import atomic
+
+STYLE = {
+    "font.family": "STIXGeneral",
+    "mathtext.fontset": "stix",
+    "font.size": 9,
+    "axes.titlesize": 9,
+    "axes.labelsize": 9,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "legend.fontsize": 8,
+    "axes.linewidth": 0.6,
+    "axes.formatter.use_mathtext": True,
+    "axes.axisbelow": True,
+    "xtick.direction": "in",
+    "ytick.direction": "in",
+    "xtick.top": True,
+    "ytick.right": True,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "xtick.minor.width": 0.4,
+    "ytick.minor.width": 0.4,
+    "lines.linewidth": 1.1,
+    "lines.markersize": 4,
+    "legend.frameon": False,
+    "legend.handlelength": 1.8,
+    "figure.dpi": 100,
+    "savefig.dpi": 200,
+    # TrueType letters stay text in the PDF, for search and for the journals' checks.
+    "pdf.fonttype": 42,
+}
+
+SINGLE = 3.5
+"""Width of a one-column figure [inch]."""
+
+DOUBLE = 7.0
+"""Width of a two-column figure [inch]."""
+
+COMPONENT_COLOURS = {
+    "streamwise": "#117733",
+    "spanwise": "#332288",
+    "vertical": "#cc6677",
+    "lateral": "#882255",
+}
+"""Of Paul Tol's muted set, which the colour-blind can tell apart."""
+
+CATEGORY_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
+"""Okabe & Ito 2008."""
+
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+
+REFERENCE = "0.35"
+"""Grey of reference lines and of other people's points."""
+
+PHI_RANGE = (1e-8, 1e-3)
+"""Volume fractions at the ends of the colour scale: the same phi has one colour in all figures."""
+
+
+def styled(draw: Callable) -> Callable:
+    """Let a figure function draw under the common style, whatever the caller's settings."""
+
+    @functools.wraps(draw)
+    def drawn(*arguments, **settings):
+        with mpl.rc_context(STYLE):
+            return draw(*arguments, **settings)
+
+    return drawn
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """A figure with constrained layout, outside of pyplot and its global state."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def phi_colour(volume_fraction: float):
+    """Colour of a volume fraction, from pale (dilute) to dark (dense)."""
+    low, high = np.log10(PHI_RANGE)
+    place = np.clip((np.log10(volume_fraction) - low) / (high - low), 0, 1)
+    return mpl.colormaps["viridis_r"](0.08 + 0.92 * place)
+
+
+def phi_label(volume_fraction: float) -> str:
+    """Volume fraction as a power of ten, with its factor where it is not a whole power."""
+    exponent = int(np.floor(np.log10(volume_fraction) + 1e-9))
+    factor = volume_fraction / 10.0**exponent
+    if abs(factor - 1) < 1e-6:
+        return f"$10^{{{exponent}}}$"
+    return f"${factor:.3g}\\times 10^{{{exponent}}}$"
+
+
+def phi_legend(figure: Figure, volume_fractions: Iterable[float]) -> None:
+    """Put one legend with the colours of the volume fractions above the panels."""
+    phi = sorted(set(volume_fractions))
+    handles = [Line2D([], [], color=phi_colour(p), lw=2.5, label=phi_label(p)) for p in phi]
+    figure.legend(
+        handles=handles,
+        title=r"volume fraction $\varphi$",
+        loc="outside upper center",
+        ncols=len(phi),
+        columnspacing=1.2,
+        handlelength=1.2,
+    )
+
+
+def letter(axes: Sequence) -> None:
+    """Name panels (a), (b), … above their upper left corners."""
+    for i, ax in enumerate(axes):
+        ax.set_title(f"({chr(ord('a') + i)})", loc="left")
+
+
+def require(frame: pd.DataFrame, columns: Sequence[str], figure: str, fewest: int = 1) -> None:
+    """Raise ValueError where a table lacks a column or has too few rows for a figure."""
+    missing = [column for column in columns if column not in frame]
+    if missing:
+        raise ValueError(
+            f"the table of {figure} lacks the column {missing[0]!r}; it has {list(frame.columns)}"
+        )
+    if len(frame) < fewest:
+        raise ValueError(f"the table of {figure} has {len(frame)} rows; at least {fewest} needed")
+
+
+def require_components(frame: pd.DataFrame, components: Iterable[str], figure: str) -> None:
+    """Raise ValueError where a table has no rows of one of the force components."""
+    for component in components:
+        if not (frame["component"] == component).any():
+            raise ValueError(f"the table of {figure} has no rows of component {component!r}")
+
+
+def save(figure: Figure, frame: pd.DataFrame, stem) -> None:
+    """Write `stem`.png (200 dpi), .pdf and .csv, each atomically and with the same bytes each time.
+
+    The CSV holds `frame`, the numbers drawn, with digits enough to read back the same bits. Dates
+    and program versions stay out of the pictures' metadata.
+    """
+    stem = str(stem)
+    with mpl.rc_context(STYLE):
+        with atomic(f"{stem}.png") as path:
+            figure.savefig(path, metadata={"Software": None})
+        with atomic(f"{stem}.pdf") as path:
+            metadata = {"CreationDate": None, "Creator": None, "Producer": None}
+            figure.savefig(path, metadata=metadata)
+    with atomic(f"{stem}.csv") as path:
+        frame.to_csv(path, index=False)

@@ -1,0 +1,125 @@
+"""Figures of the Voronoï cells: clusters and voids."""
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from dustfall.figures.style import (
+    CATEGORY_COLOURS,
+    MARKERS,
+    REFERENCE,
+    SINGLE,
+    new_figure,
+    phi_colour,
+    phi_legend,
+    require,
+    styled,
+)
+
+
+@styled
+def voronoi_pdf(frame: pd.DataFrame) -> Figure:
+    """P.d.f. of normalised Voronoï volumes at each Galileo number, the random start, gamma laws.
+
+    `frame`: source, galileo_multiple, volume, density, low, high, as
+    `analysis.voronoi.voronoi_pdf_table` gives. Raises ValueError for a missing column or fewer than
+    two rows.
+    """
+    columns = ["source", "galileo_multiple", "volume", "density", "low", "high"]
+    require(frame, columns, "voronoi_pdf", fewest=2)
+    figure = new_figure(1.4 * SINGLE, 3.4)
+    ax = figure.subplots()
+    shown = frame[frame["density"] > 0]
+    steady = shown[shown["source"] == "steady state"]
+    for i, (multiple, rows) in enumerate(steady.groupby("galileo_multiple")):
+        colour = CATEGORY_COLOURS[i % len(CATEGORY_COLOURS)]
+        ax.fill_between(rows["volume"], rows["low"], rows["high"], color=colour, alpha=0.25, lw=0)
+        name = r"$\mathrm{Ga}$" if multiple == 1 else f"${multiple:g}\\,\\mathrm{{Ga}}$"
+        ax.plot(rows["volume"], rows["density"], color=colour, label=f"steady state, {name}")
+    start = shown[shown["source"] == "random start"]
+    ax.plot(
+        start["volume"],
+        start["density"],
+        ls="none",
+        marker="o",
+        ms=2.8,
+        mfc="none",
+        mew=0.7,
+        color="k",
+        label="random start",
+    )
+    for source, line in {"gamma, k = 5, theta = 0.2": "--", "gamma, k = 5.59": ":"}.items():
+        rows = frame[frame["source"] == source]
+        label = source.replace("theta", r"$\theta$").replace("k =", "$k$ =")
+        ax.plot(rows["volume"], rows["density"], color=REFERENCE, ls=line, label=label)
+    ax.set_yscale("log")
+    ax.set_ylim(1e-3, 2)
+    ax.set_xlim(0, 3.5)
+    ax.set_xlabel(r"cell volume $V\,/\,\overline{V}$")
+    ax.set_ylabel("p.d.f.")
+    ax.legend(loc="upper right")
+    return figure
+
+
+@styled
+def voronoi_variance(frame: pd.DataFrame) -> Figure:
+    """Variance of normalised Voronoï volumes against settling velocity, by volume fraction.
+
+    `frame`: source, n, volume_fraction, galileo, variance, low, high, inverse_beta,
+    inverse_beta_low, inverse_beta_high, poisson, as `analysis.voronoi.voronoi_variance_table`
+    gives. Hollow: the random start of the same case. Raises ValueError for a missing column or an
+    empty table.
+    """
+    columns = ["source", "n", "volume_fraction", "variance", "low", "high"]
+    speed = ["inverse_beta", "inverse_beta_low", "inverse_beta_high"]
+    require(frame, [*columns, *speed, "poisson"], "voronoi_variance")
+    figure = new_figure(1.4 * SINGLE, 3.5)
+    ax = figure.subplots()
+    numbers = sorted(frame["n"].unique())
+    for row in frame.itertuples():
+        steady = row.source == "steady state"
+        vertical = np.nan_to_num([[row.variance - row.low], [row.high - row.variance]])
+        sideways = np.nan_to_num(
+            [
+                [row.inverse_beta - row.inverse_beta_low],
+                [row.inverse_beta_high - row.inverse_beta],
+            ]
+        )
+        colour = phi_colour(row.volume_fraction)
+        ax.errorbar(
+            row.inverse_beta,
+            row.variance,
+            yerr=vertical if steady else None,
+            xerr=sideways if steady else None,
+            color=colour,
+            mfc=colour if steady else "none",
+            marker=MARKERS[numbers.index(row.n) % len(MARKERS)],
+            ms=5 if steady else 4,
+            elinewidth=0.8,
+            capsize=2,
+            ls="none",
+            zorder=3 if steady else 2,
+        )
+    poisson = frame["poisson"].iloc[0]
+    ax.axhline(poisson, color=REFERENCE, lw=0.8, ls="--", zorder=0)
+    ax.set_xlabel(r"settling velocity $\langle v_s\rangle / v_{s,\mathrm{Stokes}} = 1/\beta$")
+    ax.set_ylabel(r"$\mathrm{var}(V\,/\,\overline{V}) \;/\; (k\theta^2)$")
+    handles = [
+        Line2D(
+            [],
+            [],
+            color="k",
+            ls="none",
+            marker=MARKERS[i % len(MARKERS)],
+            label=f"$n = {int(n):,}$".replace(",", r"\,"),
+        )
+        for i, n in enumerate(numbers)
+    ]
+    handles.append(
+        Line2D([], [], color="k", ls="none", marker="o", mfc="none", label="random start")
+    )
+    handles.append(Line2D([], [], color=REFERENCE, lw=0.8, ls="--", label="random points"))
+    ax.legend(handles=handles, loc="upper left")
+    phi_legend(figure, frame["volume_fraction"])
+    return figure

@@ -1,0 +1,168 @@
+"""Voronoï cells: they fill the box, random points have their known variance, laws are laws."""
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+from scipy import integrate
+from scipy.spatial import ConvexHull
+from scipy.spatial import Voronoi as ScipyVoronoi
+
+from dustfall.analysis.references import MATCHED_GAMMA, PAPER_GAMMA, POISSON_VORONOI_VARIANCE
+from dustfall.analysis.settling import CASE
+from dustfall.analysis.voronoi import (
+    block_bootstrap,
+    gamma_pdf,
+    snapshot_volumes,
+    volume_distribution,
+    volume_variance,
+    voronoi_pdf_table,
+    voronoi_variance_table,
+    voronoi_volumes,
+)
+
+
+def random_points(n, side=1.0, seed=1):
+    return np.random.default_rng([seed, n]).uniform(0, side, (n, 3))
+
+
+def trajectory(galileo=0.078, frames=6, n=60, side=10.0, drift=500.0):
+    rng = np.random.default_rng([frames, n])
+    start = rng.uniform(0, side, (n, 3))
+    steps = rng.normal(size=(frames, n, 3)) - [0, 0, drift]
+    return xr.Dataset(
+        {
+            "time": ("frame", 20.0 * np.arange(frames)),
+            "coordinates": (("frame", "atom", "spatial"), start + np.cumsum(steps, axis=0)),
+            "cell_lengths": (("frame", "cell_spatial"), np.full((frames, 3), side)),
+        },
+        attrs={"model": "idnn", "n": n, "volume_fraction": 1e-3, "galileo": galileo, "seed": 1},
+    )
+
+
+@pytest.mark.parametrize("lengths", [(1.0, 1.0, 1.0), (3741.0, 3741.0, 3741.0), (1.0, 2.0, 5.0)])
+def test_cells_fill_the_box(lengths):
+    volumes = voronoi_volumes(random_points(500) * lengths, lengths)
+    assert volumes.sum() == pytest.approx(np.prod(lengths), rel=1e-6)
+    assert (volumes > 0).all()
+
+
+def test_unwrapped_positions_have_the_cells_of_wrapped_ones():
+    points = random_points(200, 10.0)
+    images = points + 10.0 * np.random.default_rng(2).integers(-90, 90, points.shape)
+    expected = voronoi_volumes(points, 10.0)
+    np.testing.assert_allclose(voronoi_volumes(images, 10.0), expected, rtol=1e-4)
+
+
+def test_a_lattice_has_equal_cells():
+    grid = np.stack(np.meshgrid(*[np.arange(5)] * 3), axis=-1).reshape(-1, 3) + 0.5
+    np.testing.assert_allclose(voronoi_volumes(grid, 5.0), 1.0, rtol=1e-6)
+
+
+def test_volumes_are_those_of_an_independent_tessellation_with_images():
+    points = random_points(120)
+    shifts = np.stack(np.meshgrid(*[[0, -1, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    images = (points + shifts[:, None]).reshape(-1, 3)
+    cells = ScipyVoronoi(images)
+    expected = [
+        ConvexHull(cells.vertices[cells.regions[cells.point_region[i]]]).volume for i in range(120)
+    ]
+    np.testing.assert_allclose(voronoi_volumes(points, 1.0), expected, rtol=1e-4)
+
+
+def test_random_points_have_variance_0_179_within_the_interval():
+    volumes = np.array([voronoi_volumes(random_points(1000, seed=s), 1.0) for s in range(25)])
+    found = volume_variance(volumes / volumes.mean(axis=1, keepdims=True), seed=1)
+    assert found["low"] < POISSON_VORONOI_VARIANCE < found["high"]
+    assert found["high"] - found["low"] < 0.03
+    assert found["value"] == pytest.approx(POISSON_VORONOI_VARIANCE, abs=0.01)
+
+
+def test_snapshots_of_a_frozen_cloud_count_once():
+    volumes = voronoi_volumes(random_points(500), 1.0) * 500
+    once = volume_variance(volumes, seed=1)
+    often = volume_variance(np.tile(volumes, (40, 1)), seed=1)
+    assert often == pytest.approx(once)
+    assert once["low"] < once["value"] < once["high"]
+
+
+def test_gamma_laws_are_normalised_with_mean_one_and_their_variance():
+    x = np.linspace(0, 20, 20001)
+    for shape, scale in (PAPER_GAMMA, MATCHED_GAMMA):
+        density = gamma_pdf(x, shape, scale)
+        assert integrate.simpson(density, x) == pytest.approx(1, abs=1e-8)
+        assert integrate.simpson(x * density, x) == pytest.approx(1, abs=1e-8)
+        variance = integrate.simpson((x - 1) ** 2 * density, x)
+        assert variance == pytest.approx(shape * scale**2, abs=1e-8)
+    assert PAPER_GAMMA[0] * PAPER_GAMMA[1] ** 2 == pytest.approx(0.2)
+    assert MATCHED_GAMMA[0] == pytest.approx(5.59, abs=0.01)
+
+
+def test_volume_density_integrates_to_one_and_follows_the_matched_gamma_law():
+    volumes = np.array([voronoi_volumes(random_points(2000, seed=s), 1.0) for s in range(5)]) * 2000
+    table = volume_distribution(volumes, seed=1)
+    assert table["density"].sum() * 0.1 == pytest.approx(1, abs=1e-3)
+    law = gamma_pdf(table["volume"], *MATCHED_GAMMA)
+    assert np.abs(table["density"] - law).max() < 0.08
+    assert (table["low"] <= table["density"]).all()
+    assert (table["density"] <= table["high"]).all()
+
+
+def test_block_bootstrap_has_the_textbook_width_and_none_of_one_block():
+    x = np.random.default_rng(6).normal(size=400)
+    low, high = block_bootstrap(x, seed=1)
+    assert (high - low) / (2 * 1.96 * x.std() / 20) == pytest.approx(1, abs=0.1)
+    assert np.isnan(block_bootstrap(x[:3], seed=1, length=2.0)).all()
+
+
+def test_snapshots_are_chosen_in_time_and_volumes_normalised():
+    seen = []
+    volumes = snapshot_volumes(trajectory(), 40.0, snapshots=2, progress=lambda *a: seen.append(a))
+    assert volumes.shape == (2, 60)
+    np.testing.assert_allclose(volumes.mean(axis=1), 1)
+    assert seen == [(1, 2), (2, 2)]
+    with pytest.raises(ValueError, match="no frame lies between 300"):
+        snapshot_volumes(trajectory(), 300.0)
+
+
+def test_pdf_table_names_galileo_numbers_as_multiples_of_the_lowest():
+    table = voronoi_pdf_table([trajectory(0.312), trajectory(0.078)], 50.0, seed=1)
+    assert table["source"].unique().tolist() == [
+        "random start",
+        "steady state",
+        "gamma, k = 5, theta = 0.2",
+        "gamma, k = 5.59",
+    ]
+    assert table["galileo_multiple"].dropna().unique().tolist() == [1.0, 4.0]
+
+
+def test_variance_table_stands_beside_the_settling_velocity_of_the_same_case():
+    case = dict(zip(CASE, ("idnn", 60, 1e-3, 0.078), strict=True))
+    steady = pd.DataFrame([case | {"value": 1.4, "low": 1.3, "high": 1.5}])
+    table = voronoi_variance_table([trajectory()], steady, 50.0, seed=1)
+    assert table["source"].tolist() == ["random start", "steady state"]
+    assert (table["inverse_beta"] == 1.4).all()
+    assert table["poisson"].iloc[0] == pytest.approx(0.89516)
+    first = snapshot_volumes(trajectory().isel(frame=[0]))
+    assert table["variance"].iloc[0] == pytest.approx(first.var() / 0.2)
+    with pytest.raises(ValueError, match="no row for"):
+        voronoi_variance_table([trajectory(galileo=0.3)], steady, 50.0, seed=1)
+
+
+@pytest.mark.parametrize(
+    ("points", "lengths", "match"),
+    [
+        (np.ones((1, 3)), 1.0, "n >= 2"),
+        (np.ones((4, 2)), 1.0, "shape"),
+        (np.array([[0.1, 0.2, 0.3], [np.nan, 0, 0]]), 1.0, "point 1"),
+        (random_points(9), (1.0, 1.0, 0.0), "above zero"),
+    ],
+)
+def test_bad_points_are_refused(points, lengths, match):
+    with pytest.raises(ValueError, match=match):
+        voronoi_volumes(points, lengths)
+
+
+def test_no_trajectories_are_refused():
+    with pytest.raises(ValueError, match="at least one"):
+        voronoi_pdf_table([], 50.0, seed=1)

@@ -1,0 +1,355 @@
+"""Each figure draws exactly the numbers of its table, also when read back from its CSV."""
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+import pytest
+
+from dustfall import figures
+from dustfall.analysis.correlations import predictions_against_target, spearman_by_neighbours
+from dustfall.analysis.distributions import force_distributions, force_samples
+from dustfall.analysis.mesh_study import mesh_study_table
+from dustfall.analysis.settling import inverse_beta_table
+from dustfall.figures.style import PHI_RANGE, STYLE, phi_colour, phi_label, save
+
+PHI = (1e-8, 1e-5, 1e-3)
+
+
+def rng():
+    return np.random.default_rng(11)
+
+
+def forces(m=400):
+    r = rng()
+    phi = 10 ** r.uniform(-8, -3, m)
+    spread = (phi / 1e-3) ** 0.2
+    force = r.laplace(scale=0.3, size=(m, 3)) * spread[:, None]
+    force[:, 1] = 24 - 8 * spread * r.uniform(size=m)
+    return phi, force
+
+
+def waves(columns):
+    """Curves of three particles at three volume fractions."""
+    t = np.linspace(0, 10, 20)
+    return pd.concat(
+        [
+            pd.DataFrame({"volume_fraction": phi, "n": 1000, "particle": p} | columns(t, phi, p))
+            for phi in PHI
+            for p in (1, 2, 3)
+        ],
+        ignore_index=True,
+    )
+
+
+def force_scatter():
+    return force_samples(*forces(), number=100)
+
+
+def force_pdf():
+    return force_distributions(*forces(), points=60)
+
+
+def spearman():
+    return spearman_by_neighbours(rng().normal(size=(60, 5, 3)), forces(60)[1])
+
+
+def predicted_vs_target():
+    target = forces(50)[1]
+    models = {"IDNN": 0.98 * target, "dense": 0.9 * target, "anchored": target}
+    return predictions_against_target(target, models)
+
+
+def inverse_beta():
+    steady = pd.DataFrame(
+        [
+            {
+                "model": "idnn",
+                "n": n,
+                "volume_fraction": phi,
+                "galileo": 0.078,
+                "value": 1 + phi**0.2,
+                "low": 0.99 + phi**0.2,
+                "high": 1.01 + phi**0.2,
+                "runs": 1,
+            }
+            for n in (1000, 10000)
+            for phi in PHI
+        ]
+    )
+    return inverse_beta_table(steady)
+
+
+def settling_in_time():
+    table = waves(lambda t, phi, p: {"time": t, "mean": 1 + phi * t, "variance": phi * t})
+    table["n"] = table["particle"].map({1: 1000, 2: 10000, 3: 33000})
+    return table.drop(columns="particle").assign(model="idnn")
+
+
+def phase_and_spectra():
+    def panel(name, slope, x, y):
+        def columns(t, phi, p):
+            fields = {"panel": name, "x": x(t, phi), "y": y(t, phi)}
+            return fields | {"slope": slope, "slope_error": 0.05}
+
+        return waves(columns)
+
+    return pd.concat(
+        [
+            panel("phase", np.nan, lambda t, phi: 1 + phi**0.3 * np.sin(t), lambda t, phi: 1 + t),
+            panel("spectrum", -2.0, lambda t, phi: 0.1 + t, lambda t, phi: phi * (0.1 + t) ** -2),
+            panel("fit", -2.0, lambda t, phi: 0.1 + t, lambda t, phi: phi * (0.1 + t) ** -2),
+        ],
+        ignore_index=True,
+    )
+
+
+def trajectories():
+    return waves(
+        lambda t, phi, p: {"time": t, "dx": p * phi**0.2 * np.sin(t), "dy": p * t, "dz": -9 * t}
+    )
+
+
+def voronoi_pdf():
+    volume = np.linspace(0.05, 3, 30)
+    density = volume**4 * np.exp(-5 * volume)
+    sources = {"random start": [np.nan], "steady state": [1.0, 2.0, 4.0]}
+    sources |= {"gamma, k = 5, theta = 0.2": [np.nan], "gamma, k = 5.59": [np.nan]}
+    return pd.concat(
+        [
+            pd.DataFrame(
+                {
+                    "source": source,
+                    "galileo_multiple": multiple,
+                    "volume": volume,
+                    "density": (1 + 0.1 * i) * density,
+                    "low": 0.9 * density,
+                    "high": 1.5 * density,
+                }
+            )
+            for source, multiples in sources.items()
+            for i, multiple in enumerate(multiples)
+        ],
+        ignore_index=True,
+    )
+
+
+def voronoi_variance():
+    rows = [
+        {
+            "source": source,
+            "n": n,
+            "volume_fraction": phi,
+            "galileo": 0.078,
+            "variance": 0.9 + phi**0.3,
+            "low": 0.85 + phi**0.3,
+            "high": 0.95 + phi**0.3,
+            "inverse_beta": 1 + phi**0.2,
+            "inverse_beta_low": 0.99 + phi**0.2,
+            "inverse_beta_high": 1.01 + phi**0.2,
+            "poisson": 0.89516,
+        }
+        for source in ("random start", "steady state")
+        for n in (1000, 10000)
+        for phi in PHI
+    ]
+    return pd.DataFrame(rows)
+
+
+def mesh_study():
+    nodes = np.array([50, 100, 200])
+    study = [
+        pd.DataFrame({"scheme": s, "nodes": nodes, "elements": 2 * nodes, "force": 24 - f / nodes})
+        for s, f in {"flat": 60.0, "projected": 2.0}.items()
+    ]
+    return mesh_study_table(pd.concat(study, ignore_index=True))
+
+
+TABLES = {
+    table.__name__: table
+    for table in (
+        force_scatter,
+        force_pdf,
+        spearman,
+        predicted_vs_target,
+        inverse_beta,
+        settling_in_time,
+        phase_and_spectra,
+        trajectories,
+        voronoi_pdf,
+        voronoi_variance,
+        mesh_study,
+    )
+}
+
+
+def drawn_points(figure) -> set[tuple[float, float]]:
+    """Data points of all lines and scatters of a figure."""
+    points = []
+    for ax in figure.axes:
+        points += [line.get_xydata() for line in ax.lines]
+        points += [c.get_offsets().data for c in ax.collections if hasattr(c, "get_sizes")]
+    return {tuple(p) for p in np.concatenate(points).tolist()}
+
+
+def pairs(frame, x, y) -> set[tuple[float, float]]:
+    return set(zip(frame[x].astype(float), frame[y].astype(float), strict=True))
+
+
+XY = {
+    "force_scatter": ("volume_fraction", "force"),
+    "spearman": ("neighbours", "rho"),
+    "predicted_vs_target": ("target", "predicted"),
+    "inverse_beta": ("volume_fraction", "value"),
+    "phase_and_spectra": ("x", "y"),
+    "voronoi_pdf": ("volume", "density"),
+    "voronoi_variance": ("inverse_beta", "variance"),
+    "mesh_study": ("nodes", "force"),
+}
+
+
+def test_every_figure_of_the_package_is_tested_here():
+    assert set(TABLES) | {"save"} == set(figures.__all__)
+
+
+@pytest.mark.parametrize("name", XY)
+def test_all_numbers_of_the_table_are_drawn(name):
+    table = TABLES[name]()
+    assert pairs(table, *XY[name]) <= drawn_points(getattr(figures, name)(table))
+
+
+def test_panels_with_two_views_draw_both():
+    table = trajectories()
+    drawn = drawn_points(figures.trajectories(table))
+    assert pairs(table, "dx", "dz") | pairs(table, "dx", "dy") <= drawn
+    table = settling_in_time()
+    drawn = drawn_points(figures.settling_in_time(table))
+    moving = table[table["variance"] > 0]
+    assert pairs(table, "time", "mean") | pairs(moving, "time", "variance") <= drawn
+    table = mesh_study()
+    assert pairs(table, "nodes", "error") <= drawn_points(figures.mesh_study(table))
+
+
+def test_ridges_are_the_densities_on_one_scale_within_a_decade():
+    table = force_pdf()
+    left, right = figures.force_pdf(table).axes
+    for ax, component in ((left, "streamwise"), (right, "spanwise")):
+        for level, (_, decade) in enumerate(table.groupby("phi_low")):
+            curve = decade[decade["component"] == component]
+            ridges = [
+                line.get_ydata() - level
+                for line in ax.lines
+                if np.array_equal(line.get_xdata(), curve["force"])
+            ]
+            scale = [ridge / curve["density"] for ridge in ridges]
+            constant = [s.mean() for s in scale if np.ptp(s) < 1e-6 * s.mean()]
+            assert constant
+            assert 0 < constant[0] * curve["density"].max() < 1.36
+
+
+def assert_labels_fit(figure):
+    """No legend or label leaves the page, and every row and column of panels has its axis named."""
+    renderer, page = figure.canvas.get_renderer(), figure.bbox
+    with mpl.rc_context(STYLE):  # mathtext picks its font when it is measured
+        boxes = [legend.get_window_extent(renderer) for legend in figure.legends]
+        boxes += [ax.get_tightbbox(renderer) for ax in figure.axes]
+    for box in boxes:
+        assert page.x0 - 1 <= box.x0 < box.x1 <= page.x1 + 1
+        assert page.y0 - 1 <= box.y0 < box.y1 <= page.y1 + 1
+    for ax in figure.axes:
+        place = ax.get_subplotspec()
+        assert ax.get_xlabel() or not place.is_last_row()
+        assert ax.get_ylabel() or not place.is_first_col()
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_saved_csv_draws_the_same_picture_with_all_its_labels(name, tmp_path):
+    draw = getattr(figures, name)
+    table = TABLES[name]()
+    figure = draw(table)
+    save(figure, table, tmp_path / name)
+    assert {path.name for path in tmp_path.iterdir()} == {
+        f"{name}{suffix}" for suffix in (".png", ".pdf", ".csv")
+    }
+    assert_labels_fit(figure)
+    again = pd.read_csv(tmp_path / f"{name}.csv")
+    pd.testing.assert_frame_equal(again, table, check_dtype=False, rtol=0, atol=0)
+    save(draw(again), again, tmp_path / "again" / name)
+    for suffix in (".png", ".pdf", ".csv"):
+        first, second = (folder / f"{name}{suffix}" for folder in (tmp_path, tmp_path / "again"))
+        assert first.read_bytes() == second.read_bytes()
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_empty_tables_and_missing_columns_are_refused(name):
+    draw, table = getattr(figures, name), TABLES[name]()
+    with pytest.raises(ValueError, match=f"{name} has 0 rows"):
+        draw(table.iloc[:0])
+    drawn = XY.get(name, ("density" if name == "force_pdf" else "volume_fraction",))[-1]
+    drawn = "dz" if name == "trajectories" else drawn
+    with pytest.raises(ValueError, match=f"{name} lacks the column '{drawn}'"):
+        draw(table.drop(columns=drawn))
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["force_pdf", "settling_in_time", "phase_and_spectra", "trajectories", "voronoi_pdf"],
+)
+def test_a_curve_needs_two_rows(name):
+    with pytest.raises(ValueError, match=f"{name} has 1 rows"):
+        getattr(figures, name)(TABLES[name]().iloc[:1])
+
+
+@pytest.mark.parametrize("name", ["force_scatter", "inverse_beta", "voronoi_variance"])
+def test_one_sample_is_drawn(name, tmp_path):
+    table = TABLES[name]()
+    table = table.drop_duplicates("component") if name == "force_scatter" else table.iloc[:1]
+    save(getattr(figures, name)(table), table, tmp_path / name)
+
+
+def test_tables_of_several_cases_are_refused_where_one_is_drawn():
+    both = pd.concat([spearman(), spearman().assign(coordinates="cartesian")])
+    with pytest.raises(ValueError, match="one kind of coordinates"):
+        figures.spearman(both)
+    with pytest.raises(ValueError, match="one model"):
+        figures.settling_in_time(
+            pd.concat([settling_in_time(), settling_in_time().assign(model="dense")])
+        )
+    for name in ("trajectories", "phase_and_spectra"):
+        with pytest.raises(ValueError, match="one n"):
+            getattr(figures, name)(pd.concat([TABLES[name](), TABLES[name]().assign(n=33000)]))
+    with pytest.raises(ValueError, match="'simulation'"):
+        figures.inverse_beta(inverse_beta().query("source == 'paper'"))
+    for name in ("predicted_vs_target", "force_scatter", "force_pdf"):
+        with pytest.raises(ValueError, match=f"{name} has no rows of component"):
+            getattr(figures, name)(TABLES[name]().query("component == 'streamwise'"))
+
+
+def test_r2_and_slope_stand_in_the_panels():
+    table = predicted_vs_target()
+    texts = [t.get_text() for ax in figures.predicted_vs_target(table).axes for t in ax.texts]
+    dense = table[(table["model"] == "dense") & (table["component"] == "lateral")]["r2"].iloc[0]
+    assert f"$R^2 = {dense:.3f}$" in texts or any(f"{dense:.4f}" in t for t in texts)
+    spectra = figures.phase_and_spectra(phase_and_spectra())
+    notes = [t.get_text() for ax in spectra.axes for t in ax.texts]
+    assert sum("-2.00 \\pm 0.05" in n for n in notes) == 3
+
+
+def test_volume_fractions_have_their_own_colours_from_pale_to_dark():
+    colours = np.array([phi_colour(10.0**k)[:3] for k in range(-8, -2)])
+    luminance = colours @ [0.2126, 0.7152, 0.0722]
+    assert (np.diff(luminance) < -0.03).all()
+    assert phi_colour(1e-12) == phi_colour(PHI_RANGE[0])
+    assert phi_label(1e-5) == "$10^{-5}$"
+    assert phi_label(2.5e-4) == "$2.5\\times 10^{-4}$"
+
+
+def test_a_failed_save_leaves_the_old_files(tmp_path):
+    table = mesh_study()
+    figure = figures.mesh_study(table)
+    save(figure, table, tmp_path / "mesh_study")
+    before = (tmp_path / "mesh_study.png").read_bytes()
+    figure.axes[0].set_title("$\\nosuchcommand$")
+    with pytest.raises(ValueError, match="nosuchcommand"):
+        save(figure, table, tmp_path / "mesh_study")
+    assert (tmp_path / "mesh_study.png").read_bytes() == before
+    assert len(list(tmp_path.iterdir())) == 3
