@@ -307,7 +307,8 @@ def _facing_points(shift, corners, dofs, rule, weights, separation):
 
     shift: centre of the other sphere seen from this one [d_p]. An element is quartered until it is
     narrower than its distance from the other surface, divided by `separation`.
-    Returns points [d_p], weighted shape functions (q, 6) and node numbers (q, 6).
+    Returns leaf by leaf: points (k, q, 3) [d_p], weighted shape functions (k, q, 6) and the
+    numbers of the six nodes (k, 6).
     """
     count = len(weights)
     capacity = 4 * len(corners)
@@ -338,45 +339,56 @@ def _facing_points(shift, corners, dofs, rule, weights, separation):
                 leaf, owner = more_leaf, more_owner
             leaf[leaves], owner[leaves] = sub, e
             leaves += 1
-    points = np.empty((leaves * count, 3))
-    shape = np.empty((leaves * count, SHAPES))
-    nodes = np.empty((leaves * count, SHAPES), dtype=np.int64)
+    points = np.empty((leaves, count, 3))
+    shape = np.empty((leaves, count, SHAPES))
+    nodes = np.empty((leaves, SHAPES), dtype=np.int64)
     density = np.empty(count)
     for k in range(leaves):
-        here = slice(k * count, (k + 1) * count)
-        _points_on(corners[owner[k]], rule @ leaf[k], points[here], shape[here], density)
+        _points_on(corners[owner[k]], rule @ leaf[k], points[k], shape[k], density)
         # A sub-triangle covers this share of the flat element's area.
         share = abs(np.linalg.det(leaf[k]))
         for q in range(count):
-            shape[k * count + q] *= share * density[q] * weights[q] * RADIUS**2
-            nodes[k * count + q] = dofs[owner[k]]
+            shape[k, q] *= share * density[q] * weights[q] * RADIUS**2
+        nodes[k] = dofs[owner[k]]
     return RADIUS * points, shape, nodes
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath={"contract"})
+def _add_velocity(target, y, psi, nodes, velocity):
+    """velocity[b] += G(target - y) psi_b(y) summed over all points: 6 entries for each node b.
+
+    The points come leaf by leaf: sums over a leaf stay in registers, and only its six nodes are
+    written, which halves the time of this loop, the hottest of a near pair.
+    """
+    count = y.shape[1]
+    g, leaf = np.empty((count, 6)), np.empty((SHAPES, 6))
+    for k in range(len(y)):
+        for q in range(count):
+            _stokeslet(target[0] - y[k, q, 0], target[1] - y[k, q, 1], target[2] - y[k, q, 2], g[q])
+        leaf[:] = 0.0
+        for q in range(count):
+            for b in range(SHAPES):
+                for c in range(6):
+                    leaf[b, c] += psi[k, q, b] * g[q, c]
+        for b in range(SHAPES):
+            for c in range(6):
+                velocity[nodes[k, b], c] += leaf[b, c]
+
+
+@njit(cache=True, fastmath={"contract"})
 def _assemble_cross(shift, x, phi, nodes_x, y, psi, nodes_y):
     n, m = nodes_x.max() + 1, nodes_y.max() + 1
     entries = np.zeros((n, m, 6))
-    row = np.empty((m, 6))
-    g = np.empty(6)
-    for p in range(len(x)):
-        row[:] = 0.0
-        for q in range(len(y)):
-            _stokeslet(
-                shift[0] + x[p, 0] - y[q, 0],
-                shift[1] + x[p, 1] - y[q, 1],
-                shift[2] + x[p, 2] - y[q, 2],
-                g,
-            )
-            for b in range(SHAPES):
-                node = nodes_y[q, b]
-                for k in range(6):
-                    row[node, k] += psi[q, b] * g[k]
-        for a in range(SHAPES):
-            node, factor = nodes_x[p, a], phi[p, a] / (8.0 * np.pi)
-            for b in range(m):
-                for k in range(6):
-                    entries[node, b, k] += factor * row[b, k]
+    velocity = np.empty((m, 6))
+    for k in range(len(x)):
+        for p in range(x.shape[1]):
+            velocity[:] = 0.0
+            _add_velocity(shift + x[k, p], y, psi, nodes_y, velocity)
+            for a in range(SHAPES):
+                factor = phi[k, p, a] / (8.0 * np.pi)
+                for b in range(m):
+                    for c in range(6):
+                        entries[nodes_x[k, a], b, c] += factor * velocity[b, c]
     matrix = np.empty((3 * n, 3 * m))
     for a in range(n):
         for b in range(m):

@@ -1,0 +1,74 @@
+# The campaign: random scenes, boundary-element forces, force models, sedimentation, figures.
+# `snakemake -n` shows the plan, `snakemake all` runs it, `snakemake figures` makes the figures.
+import json
+import os
+import sys
+
+from snakemake.utils import min_version
+
+from workflow import plan
+from workflow.configuration import ConfigurationError, configure
+from workflow.library import ROOT, library_files
+
+min_version("9.0")
+
+
+configfile: ROOT / "config" / "config.yaml"
+
+
+try:
+    config = configure(config)
+except ConfigurationError as error:
+    sys.exit(f"Configuration: {error}")
+
+# The library of this checkout is the one whose files the rules watch, so it is the one they run;
+# each job keeps to one thread, because jobs fill the cores and bits must not hang on their number.
+os.environ.update(PYTHONPATH=str(ROOT), NUMBA_NUM_THREADS="1")
+
+
+report: "workflow/report/workflow.rst"
+
+
+include: "workflow/rules/common.smk"
+include: "workflow/rules/scenes.smk"
+include: "workflow/rules/stokes.smk"
+include: "workflow/rules/dataset.smk"
+include: "workflow/rules/idnn.smk"
+include: "workflow/rules/sedimentation.smk"
+include: "workflow/rules/figures.smk"
+
+
+rule all:
+    """Everything that the configuration asks for."""
+    default_target: True
+    input:
+        "results/config.yaml",
+        "results/dataset/summary.csv",
+        "results/model/evaluation.csv",
+        FIGURES,
+
+
+rule figures:
+    """The figures, and whatever they need."""
+    input:
+        FIGURES,
+
+
+rule configuration:
+    """Write down the configuration of this run, with every default."""
+    output:
+        "results/config.yaml",
+    log:
+        "logs/configuration.log",
+    params:
+        config=json.dumps(config),
+    script:
+        "workflow/scripts/configuration.py"
+
+
+onsuccess:
+    print("Done: see results/, and `snakemake --report report.html` for an overview.")
+
+
+onerror:
+    print("Stopped: the job that failed and its log are shown above; logs/ keeps the logs.")

@@ -1,0 +1,235 @@
+"""The data set that force models learn from: scenes and the force on their reference sphere.
+
+Scenes are solved in shards; the data set joins them in the order of radial law and scene number,
+so that neither the size of a shard nor the order of the jobs shows in it.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pandas as pd
+
+from dustfall.files import atomic
+
+CONVERGED = 0
+"""Status of a scene whose solve met its tolerance."""
+
+TEST_SCENES = 1000
+"""Item of the random stream that draws the test scenes."""
+
+DESCRIPTIONS = {
+    "neighbours": ("d_p", "centres of the five nearest spheres, sorted by distance"),
+    "force": ("Re_p c_D", "force on the reference sphere; an isolated one feels 24 along y"),
+    "volume_fraction": ("1", "phi = 15 V_p / (4 pi d_5^3), d_5 the fifth distance"),
+    "radial_law": ("", "law that the distances of the neighbours were drawn by"),
+    "scene": ("", "number of the scene within its radial law"),
+}
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """Scenes with their forces.
+
+    neighbours: (m, 5, 3) [d_p], sorted by distance; x spanwise, y streamwise, z vertical.
+    force: (m, 3) [Re_p c_D]. volume_fraction: (m,). radial_law: (m,) of str. scene: (m,) numbers
+    within each radial law.
+    """
+
+    neighbours: np.ndarray
+    force: np.ndarray
+    volume_fraction: np.ndarray
+    radial_law: np.ndarray
+    scene: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.scene)
+
+    def select(self, which) -> "Dataset":
+        """The scenes that an index array or a mask names."""
+        return Dataset(*(getattr(self, field.name)[which] for field in fields(self)))
+
+
+@dataclass(frozen=True)
+class Shard:
+    """Where the scenes of one shard and their solutions lie."""
+
+    radial_law: str
+    scenes: Path
+    solutions: Path
+
+
+def aggregate(shards: Iterable[Shard], numbers: Mapping[str, int]):
+    """Join the shards of a campaign.
+
+    numbers: scenes that each radial law must have, numbered from 0.
+
+    Returns the converged scenes as a Dataset, ordered by radial law (in the order of `numbers`) and
+    scene, and a DataFrame of all scenes with columns radial_law, scene, volume_fraction,
+    converged, iterations, residual, error_estimate, minimum_gap.
+    Raises ValueError if scenes are missing, occur twice, or differ between a scene file and its
+    solutions, or if `check` objects.
+    """
+    parts, solves = [], []
+    for shard in shards:
+        part, solve = _read_shard(shard)
+        parts.append(part)
+        solves.append(solve)
+    columns = [field.name for field in fields(Dataset)]
+    joined = Dataset(*(np.concatenate([getattr(part, name) for part in parts]) for name in columns))
+    solve = pd.concat(solves, ignore_index=True)
+
+    rank = np.array([list(numbers).index(law) for law in joined.radial_law])
+    order = np.lexsort((joined.scene, rank))
+    joined, solve = joined.select(order), solve.iloc[order].reset_index(drop=True)
+    for law, number in numbers.items():
+        found = joined.scene[joined.radial_law == law]
+        if not np.array_equal(found, np.arange(number)):
+            missing = np.setdiff1d(np.arange(number), found)
+            raise ValueError(
+                f"radial law {law} has {len(found)} scenes, {len(np.unique(found))} of them "
+                f"different; it must have each of {number} scenes once"
+                + (f" (scene {missing[0]} is missing)" if len(missing) else "")
+            )
+    dataset = joined.select(solve["converged"].to_numpy())
+    check(dataset)
+    return dataset, solve
+
+
+def check(dataset: Dataset) -> None:
+    """Raise ValueError unless every value is finite, neighbours are sorted and scenes differ."""
+    for name in ("neighbours", "force", "volume_fraction"):
+        values = getattr(dataset, name).reshape(len(dataset), -1)
+        bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
+        if len(bad):
+            raise ValueError(f"{name} of {_name(dataset, bad[0])} is not finite: {values[bad[0]]}")
+    distance = np.linalg.norm(dataset.neighbours, axis=2)
+    bad = np.flatnonzero((np.diff(distance, axis=1) < 0).any(axis=1))
+    if len(bad):
+        raise ValueError(
+            f"neighbours of {_name(dataset, bad[0])} are not sorted by distance: "
+            f"{distance[bad[0]]} d_p"
+        )
+    _, first, count = np.unique(
+        dataset.neighbours.reshape(len(dataset), -1), axis=0, return_index=True, return_counts=True
+    )
+    if (count > 1).any():
+        repeated = first[count > 1].min()
+        raise ValueError(f"{_name(dataset, repeated)} occurs more than once")
+
+
+def split(dataset: Dataset, share: float, seed: int) -> tuple[Dataset, Dataset]:
+    """Part the scenes at random into training and test scenes, `share` of all in the latter.
+
+    Both keep the order of `dataset`. Raises ValueError if share lies outside ]0, 1[ or one part
+    would be empty.
+    """
+    number = round(share * len(dataset))
+    if not (0 < share < 1 and 0 < number < len(dataset)):
+        raise ValueError(
+            f"a test share of {share} of {len(dataset)} scenes leaves no scene on one side"
+        )
+    test = np.zeros(len(dataset), bool)
+    test[np.random.default_rng([seed, TEST_SCENES]).permutation(len(dataset))[:number]] = True
+    return dataset.select(~test), dataset.select(test)
+
+
+def write(path: Path, dataset: Dataset, provenance: Mapping[str, object]) -> None:
+    """Write `dataset` as HDF5, with units and `provenance` as attributes.
+
+    Equal data give equal files: no time stamp goes in.
+    """
+    with atomic(path) as temporary, h5py.File(temporary, "w", libver="v110") as file:
+        file.attrs["frame"] = "x spanwise, y streamwise, z vertical; the flow is along +y"
+        for key, value in provenance.items():
+            file.attrs[key] = value
+        for name, (unit, description) in DESCRIPTIONS.items():
+            values = getattr(dataset, name)
+            if name == "radial_law":
+                values = values.astype(bytes)
+            stored = file.create_dataset(name, data=values, track_times=False)
+            stored.attrs["description"] = description
+            if unit:
+                stored.attrs["unit"] = unit
+
+
+def read(path: Path) -> Dataset:
+    """Read a data set that `write` wrote."""
+    with h5py.File(path) as file:
+        columns = {name: file[name][()] for name in DESCRIPTIONS}
+    columns["radial_law"] = columns["radial_law"].astype(str)
+    return Dataset(**columns)
+
+
+def summary(dataset: Dataset, solve: pd.DataFrame) -> pd.DataFrame:
+    """Table per radial law and decade of phi: counts, force statistics, effort of the solve.
+
+    dataset and solve are what `aggregate` returns. A row has 10^decade <= phi < 10^(decade+1).
+    Forces in Re_p c_D, gaps in d_p.
+    """
+    decade = ["radial_law", "decade"]
+    solve = solve.assign(decade=_decade(solve["volume_fraction"]))
+    table = solve.groupby(decade, sort=False).agg(
+        scenes=("scene", "size"),
+        unconverged=("converged", lambda converged: int((~converged).sum())),
+        iterations_median=("iterations", "median"),
+        iterations_max=("iterations", "max"),
+        error_estimate_max=("error_estimate", "max"),
+        gap_min=("minimum_gap", "min"),
+    )
+    spanwise, streamwise, vertical = dataset.force.T
+    forces = pd.DataFrame(
+        {
+            "radial_law": dataset.radial_law,
+            "decade": _decade(dataset.volume_fraction),
+            "streamwise": streamwise,
+            "spanwise": spanwise,
+            "vertical": vertical,
+        }
+    )
+    statistics = forces.groupby(decade).agg(
+        streamwise_mean=("streamwise", "mean"),
+        streamwise_min=("streamwise", "min"),
+        streamwise_variance=("streamwise", "var"),
+        spanwise_variance=("spanwise", "var"),
+        vertical_variance=("vertical", "var"),
+    )
+    return table.join(statistics).sort_index().reset_index()
+
+
+def _read_shard(shard: Shard) -> tuple[Dataset, pd.DataFrame]:
+    with h5py.File(shard.scenes) as scenes, h5py.File(shard.solutions) as solutions:
+        number = scenes["scene"][()]
+        if not np.array_equal(number, solutions["scene"][()]):
+            raise ValueError(f"{shard.solutions} does not solve the scenes of {shard.scenes}")
+        part = Dataset(
+            neighbours=scenes["neighbours"][()],
+            force=solutions["force"][:, 0],
+            volume_fraction=scenes["volume_fraction"][()],
+            radial_law=np.full(len(number), shard.radial_law),
+            scene=number,
+        )
+        solve = pd.DataFrame(
+            {
+                "radial_law": shard.radial_law,
+                "scene": number,
+                "volume_fraction": part.volume_fraction,
+                "converged": solutions["status"][()] == CONVERGED,
+                **{
+                    name: solutions[name][()]
+                    for name in ("iterations", "residual", "error_estimate", "minimum_gap")
+                },
+            }
+        )
+    return part, solve
+
+
+def _decade(phi) -> np.ndarray:
+    # Rounded first, so that a phi of 1e-5 up to its last bit opens its own decade.
+    return np.floor(np.round(np.log10(phi), 12)).astype(int)
+
+
+def _name(dataset: Dataset, index: int) -> str:
+    return f"scene {dataset.scene[index]} of radial law {dataset.radial_law[index]}"

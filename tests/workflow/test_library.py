@@ -1,0 +1,55 @@
+"""A rule watches just those library files that its script runs."""
+
+import pytest
+
+from workflow.library import ROOT, WITHOUT_RESULTS, library_files
+
+SCRIPTS = sorted((ROOT / "workflow/scripts").glob("*.py"))
+
+
+def files_of(folder, code: str) -> list[str]:
+    script = folder / "script.py"
+    script.write_text(code)
+    return library_files(script)
+
+
+def test_imports_through_other_modules_count(tmp_path):
+    files = files_of(tmp_path, "from dustfall.sedimentation.settle import settle")
+    assert "dustfall/sedimentation/settle.py" in files
+    assert "dustfall/sedimentation/neighbours.py" in files
+    assert "dustfall/forces/training.py" not in files
+    assert "dustfall/stokes/single_layer.py" not in files
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import dustfall.analysis.voronoi",
+        "from dustfall.analysis import voronoi",
+        "from dustfall.analysis.voronoi import voronoi_volumes",
+        "def late():\n    from dustfall.analysis.voronoi import voronoi_volumes",
+    ],
+)
+def test_every_way_to_import_counts(tmp_path, code):
+    files = files_of(tmp_path, code)
+    assert {"dustfall/analysis/voronoi.py", "dustfall/analysis/settling.py"} <= set(files)
+    assert "dustfall/analysis/spectra.py" not in files
+
+
+def test_a_name_that_a_package_exports_brings_the_modules_of_the_package(tmp_path):
+    files = files_of(tmp_path, "from dustfall.figures import save")
+    assert {"dustfall/figures/__init__.py", "dustfall/figures/style.py"} <= set(files)
+
+
+def test_a_name_made_up_at_run_time_is_refused(tmp_path):
+    with pytest.raises(ImportError, match=r"train_model from dustfall\.forces.*from its module"):
+        files_of(tmp_path, "from dustfall.forces import train_model")
+
+
+def test_other_packages_do_not_count(tmp_path):
+    assert files_of(tmp_path, "import numpy\nfrom pathlib import Path\nimport joblog") == []
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
+def test_scripts_can_be_followed_and_watch_nothing_without_results(script):
+    assert not WITHOUT_RESULTS & set(library_files(script))

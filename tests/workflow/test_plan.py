@@ -1,0 +1,99 @@
+"""The plan: which jobs a configuration asks for, and under which names."""
+
+import pytest
+
+from workflow import plan
+from workflow.configuration import configure
+
+FIGURES = [
+    "force_scatter",
+    "force_pdf",
+    "spearman",
+    "predicted_vs_target",
+    "inverse_beta",
+    "settling_in_time",
+    "phase_and_spectra",
+    "voronoi_pdf",
+    "voronoi_variance",
+    "trajectories",
+    "mesh_study",
+]
+
+
+def test_the_paper_takes_the_expected_jobs_and_fewer_than_a_thousand(project):
+    jobs = project.plan("--", "all")
+    shards = 14_000 // 500
+    expected = {
+        "configuration": 1,
+        "scenes": shards,
+        "meshes": shards,
+        "stokes": shards,
+        "dataset": 1,
+        # 12 configurations of layers for each of 2 components
+        "sweep": 24,
+        "winner": 1,
+        "model": 3,
+        "evaluation": 1,
+        # 3 numbers of particles, 6 volume fractions, and 2 more Galileo numbers
+        "sedimentation": 3 * 6 + 2,
+        "steady_state": 1,
+        "mesh_study": 1,
+        **{f"figure_{name}": 1 for name in FIGURES},
+    }
+    templates, operators = jobs.pop("templates"), jobs.pop("operators")
+    assert templates == operators
+    assert jobs == expected
+    assert sum(jobs.values()) + templates + operators < 1000
+
+
+def test_figures_is_a_target_that_leaves_the_tables_out(project):
+    jobs = project.plan("--", "figures")
+    assert "configuration" not in jobs
+    assert all(f"figure_{name}" in jobs for name in FIGURES)
+
+
+@pytest.mark.parametrize(("number", "size"), [(120, 40), (121, 40), (119, 40), (120, 1000)])
+def test_shards_hold_every_scene_once(number, size):
+    config = configure({"scenes": {"number": {"uniform": number, "ball": 7}, "shard_size": size}})
+    scenes = {"uniform": [], "ball": []}
+    for name in plan.shards(config):
+        law, shard = name.split("-")
+        first, last = plan.shard_scenes(config, law, shard)
+        assert 0 < last - first <= size
+        scenes[law] += range(first, last)
+    assert scenes == {"uniform": list(range(number)), "ball": list(range(7))}
+
+
+def test_more_scenes_leave_the_full_shards_as_they_are():
+    few, many = (configure({"scenes": {"number": {"uniform": n}}}) for n in (1000, 1001))
+    assert plan.shards(many)[:2] == plan.shards(few)
+    for name in plan.shards(few):
+        assert plan.shard_scenes(few, *name.split("-")) == plan.shard_scenes(many, *name.split("-"))
+
+
+def test_case_names_tell_cases_apart():
+    assert plan.Case(1000, 1e-3, 1.0).name == "n1000_phi1e-03_ga1"
+    assert plan.Case(1000, 1.5e-3, 1.0).name == "n1000_phi1.5e-03_ga1"
+    assert plan.Case(1000, 1e-3, 2.5).name == "n1000_phi1e-03_ga2.5"
+    assert plan.Case(1000, 0.1, 4.0).name == "n1000_phi1e-01_ga4"
+
+
+def test_cases_of_the_galileo_series_are_added_once():
+    assert len(plan.cases(configure({}))) == 20
+    apart = configure({"sedimentation": {"galileo": {"particles": 500}}})
+    assert len(plan.cases(apart)) == 21
+
+
+def test_trial_names_are_file_names_and_lead_back_to_their_layers():
+    config = configure({})
+    names = [trial.split("/")[1] for trial in plan.trials(config)]
+    assert len(plan.trials(config)) == 24
+    assert [plan.trial_layers(name) for name in names[:12]] == config["idnn"]["layers"]
+
+
+def test_every_case_starts_from_its_own_random_numbers():
+    config = configure({})
+    seeds = [plan.case_seed(config, case) for case in plan.cases(config)]
+    assert len(set(seeds)) == len(seeds)
+    assert seeds == [plan.case_seed(config, case) for case in plan.cases(config)]
+    assert plan.case_seed(configure({"seed": 2}), "n1000_phi1e-03_ga1") not in seeds

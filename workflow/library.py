@@ -1,0 +1,80 @@
+"""Which files of the library a script runs: the inputs that make its jobs stale when edited."""
+
+import ast
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+
+WITHOUT_RESULTS = {"dustfall/files.py", "dustfall/progress.py"}
+"""They decide how a file is put in place and what a terminal shows, not what a result is."""
+
+
+def library_files(script: str | Path) -> list[str]:
+    """Files of `dustfall` that `script` imports, directly or through one another.
+
+    Sorted paths relative to the repository root. Imports inside functions count. What a package's
+    __init__ imports counts only where a name is taken from the package and not from its module.
+    Raises ImportError for a name that a package makes up at run time: its file cannot be told.
+    """
+    found, waiting = set(), list(_imports(Path(script)))
+    while waiting:
+        path = waiting.pop()
+        if path not in found:
+            found.add(path)
+            waiting.extend(_imports(path))
+    return sorted({path.relative_to(ROOT).as_posix() for path in found} - WITHOUT_RESULTS)
+
+
+@cache
+def _imports(path: Path) -> frozenset[Path]:
+    """Library files that the file at `path` imports itself."""
+    return frozenset(_imported(path))
+
+
+def _imported(path: Path) -> Iterator[Path]:
+    for node in ast.walk(_tree(path)):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield from _module(alias.name)
+        elif isinstance(node, ast.ImportFrom):
+            package = node.module or ""
+            if node.level:
+                parents = path.relative_to(ROOT).parts[: -node.level]
+                package = ".".join([*parents, *filter(None, [node.module])])
+            for alias in node.names:
+                # `from package import name` names a module of the package, or what it holds.
+                module = _module(f"{package}.{alias.name}") or _module(package)
+                if module and module[0].stem == "__init__" and alias.name not in _names(module[0]):
+                    raise ImportError(
+                        f"{path} imports {alias.name} from {package}, whose __init__.py does not "
+                        f"name it: import it from its module"
+                    )
+                yield from module
+
+
+def _module(name: str) -> list[Path]:
+    """File of a module of the library; none for other modules."""
+    place = ROOT.joinpath(*name.split("."))
+    files = [place.with_suffix(".py"), place / "__init__.py"]
+    return [file for file in files if name.split(".")[0] == "dustfall" and file.is_file()][:1]
+
+
+@cache
+def _names(path: Path) -> frozenset[str]:
+    """Names that a file binds by definition, assignment or import at its top."""
+    names = set()
+    for node in _tree(path).body:
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            names |= {alias.asname or alias.name for alias in node.names}
+        elif isinstance(node, ast.FunctionDef | ast.ClassDef):
+            names.add(node.name)
+        else:
+            names |= {part.id for part in ast.walk(node) if isinstance(part, ast.Name)}
+    return frozenset(names)
+
+
+@cache
+def _tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"), str(path))

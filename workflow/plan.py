@@ -1,0 +1,77 @@
+"""Which artefacts a configuration asks for, and how they are named."""
+
+from decimal import Decimal
+from math import ceil
+from typing import NamedTuple
+from zlib import crc32
+
+
+class Case(NamedTuple):
+    """One run of the sedimentation solver."""
+
+    particles: int
+    volume_fraction: float
+    galileo_multiple: float
+
+    @property
+    def name(self) -> str:
+        """Name that the files of the case have, like n1000_phi1e-03_ga1."""
+        # All digits that tell phi from another number, and no more.
+        mantissa, exponent = f"{Decimal(repr(self.volume_fraction)):e}".split("e")
+        phi = f"{mantissa}e{int(exponent):+03d}"
+        return f"n{self.particles}_phi{phi}_ga{self.galileo_multiple:.15g}"
+
+
+def shards(config: dict) -> list[str]:
+    """Names of all shards, like uniform-0000: scenes are numbered and cut per radial law."""
+    size = config["scenes"]["shard_size"]
+    return [
+        f"{law}-{shard:04d}"
+        for law, number in config["scenes"]["number"].items()
+        for shard in range(ceil(number / size))
+    ]
+
+
+def shard_scenes(config: dict, law: str, shard: str) -> tuple[int, int]:
+    """Number of a shard's first scene, and the one after its last."""
+    size = config["scenes"]["shard_size"]
+    first = int(shard) * size
+    return first, min(first + size, config["scenes"]["number"][law])
+
+
+def trials(config: dict) -> list[str]:
+    """Names of all trials of the sweep, like streamwise/40-40_30-30-30."""
+    return [
+        f"{component}/{layers.replace('/', '_')}"
+        for component in ("streamwise", "lateral")
+        for layers in config["idnn"]["layers"]
+    ]
+
+
+def trial_layers(name: str) -> str:
+    """Configuration of layers that a trial's file name stands for."""
+    return name.replace("_", "/")
+
+
+def training(config: dict, model: str) -> dict:
+    """Training settings of a model: those of all, and where it differs, its own."""
+    return config["idnn"]["training"] | config["idnn"]["training_of"].get(model, {})
+
+
+def cases(config: dict) -> dict[str, Case]:
+    """Every sedimentation case by its name."""
+    settle = config["sedimentation"]
+    galileo = settle["galileo"]
+    found = [
+        *(Case(n, phi, 1.0) for n in settle["particles"] for phi in settle["volume_fractions"]),
+        *(
+            Case(galileo["particles"], galileo["volume_fraction"], multiple)
+            for multiple in galileo["multiples"]
+        ),
+    ]
+    return {case.name: case for case in found}
+
+
+def case_seed(config: dict, case: str) -> int:
+    """Seed of a case's start: it hangs on the campaign's seed and the name of the case alone."""
+    return crc32(f"{config['seed']} {case}".encode())

@@ -1,0 +1,68 @@
+# What the rule files share.
+
+
+wildcard_constraints:
+    law="uniform|ball",
+    shard=r"\d+",
+    component="streamwise|lateral",
+    layers=r"[\d-]+_[\d-]+",
+
+
+def library(script):
+    """Library files that `workflow/scripts/<script>` runs, as inputs of its job."""
+    root = os.path.relpath(ROOT)
+    files = library_files(ROOT / "workflow" / "scripts" / script)
+    return [os.path.normpath(os.path.join(root, file)) for file in files]
+
+
+def figure(name, category):
+    """Outputs of a figure: the picture for the report, the one for print, the numbers drawn."""
+    stem = f"results/figures/{name}"
+    caption = f"../report/{name}.rst"
+    return {
+        "png": report(f"{stem}.png", category=category, caption=caption),
+        "pdf": f"{stem}.pdf",
+        "csv": f"{stem}.csv",
+    }
+
+
+SHARDS = plan.shards(config)
+TRIALS = plan.trials(config)
+CASES = plan.cases(config)
+
+# The cases at the Galileo number of the properties; those of them with most particles; and the
+# cases that differ in the Galileo number alone.
+PLAIN_CASES = [name for name, case in CASES.items() if case.galileo_multiple == 1]
+LARGEST_CASES = [
+    name
+    for name in PLAIN_CASES
+    if CASES[name].particles == max(config["sedimentation"]["particles"])
+    and CASES[name].volume_fraction in config["sedimentation"]["volume_fractions"]
+]
+GALILEO_CASES = [
+    name
+    for name, case in CASES.items()
+    if case.particles == config["sedimentation"]["galileo"]["particles"]
+    and case.volume_fraction == config["sedimentation"]["galileo"]["volume_fraction"]
+]
+
+# Force models that are trained; the others need no file.
+LEARNED_MODELS = ["idnn", "dense", "anchored"]
+
+FIGURES = expand(
+    "results/figures/{figure}.{ending}",
+    figure=[
+        "force_scatter",
+        "force_pdf",
+        "spearman",
+        "predicted_vs_target",
+        "inverse_beta",
+        "settling_in_time",
+        "phase_and_spectra",
+        "voronoi_pdf",
+        "voronoi_variance",
+        "trajectories",
+        "mesh_study",
+    ],
+    ending=["png", "pdf", "csv"],
+)

@@ -1,0 +1,191 @@
+rule steady_state:
+    """Average every case over its steady state."""
+    input:
+        series=expand("results/sedimentation/{case}.series.nc", case=CASES),
+        library=library("steady_state.py"),
+    output:
+        report(
+            "results/analysis/steady_state.csv",
+            category="Sedimentation",
+            caption="../report/steady_state.rst",
+        ),
+    log:
+        "logs/analysis/steady_state.log",
+    params:
+        statistics_from=config["sedimentation"]["statistics_from"],
+    script:
+        "../scripts/steady_state.py"
+
+
+rule figure_force_scatter:
+    """Force components against volume fraction."""
+    input:
+        data="results/dataset/forces.h5",
+        library=library("figure_force_scatter.py"),
+    output:
+        **figure("force_scatter", "Data set"),
+    log:
+        "logs/figures/force_scatter.log",
+    params:
+        radial_law=config["figures"]["radial_law"],
+        samples=config["figures"]["samples"],
+    script:
+        "../scripts/figure_force_scatter.py"
+
+
+rule figure_force_pdf:
+    """P.d.f. of the force in each decade of volume fraction."""
+    input:
+        data="results/dataset/forces.h5",
+        library=library("figure_force_pdf.py"),
+    output:
+        **figure("force_pdf", "Data set"),
+        summary=report(
+            "results/analysis/force_summary.csv",
+            category="Data set",
+            caption="../report/force_summary.rst",
+        ),
+    log:
+        "logs/figures/force_pdf.log",
+    params:
+        radial_law=config["figures"]["radial_law"],
+    script:
+        "../scripts/figure_force_pdf.py"
+
+
+rule figure_spearman:
+    """Rank correlation of neighbour coordinates with the force."""
+    input:
+        data="results/dataset/forces.h5",
+        library=library("figure_spearman.py"),
+    output:
+        **figure("spearman", "Data set"),
+    log:
+        "logs/figures/spearman.log",
+    params:
+        radial_law=config["figures"]["radial_law"],
+    script:
+        "../scripts/figure_spearman.py"
+
+
+rule figure_predicted_vs_target:
+    """Predicted against target force on scenes that no model was trained on."""
+    input:
+        predictions="results/model/predictions.h5",
+        library=library("figure_predicted_vs_target.py"),
+    output:
+        **figure("predicted_vs_target", "Force models"),
+    log:
+        "logs/figures/predicted_vs_target.log",
+    params:
+        samples=config["figures"]["samples"],
+    script:
+        "../scripts/figure_predicted_vs_target.py"
+
+
+rule figure_inverse_beta:
+    """Steady settling velocity against volume fraction."""
+    input:
+        steady="results/analysis/steady_state.csv",
+        library=library("figure_inverse_beta.py"),
+    output:
+        **figure("inverse_beta", "Sedimentation"),
+    log:
+        "logs/figures/inverse_beta.log",
+    script:
+        "../scripts/figure_inverse_beta.py"
+
+
+rule figure_settling_in_time:
+    """Mean and variance of the settling velocity in time."""
+    input:
+        series=expand("results/sedimentation/{case}.series.nc", case=PLAIN_CASES),
+        library=library("figure_settling_in_time.py"),
+    output:
+        **figure("settling_in_time", "Sedimentation"),
+    log:
+        "logs/figures/settling_in_time.log",
+    script:
+        "../scripts/figure_settling_in_time.py"
+
+
+rule figure_phase_and_spectra:
+    """Phase diagrams and energy spectra of the tracked particles."""
+    input:
+        series=expand("results/sedimentation/{case}.series.nc", case=LARGEST_CASES),
+        library=library("figure_phase_and_spectra.py"),
+    output:
+        **figure("phase_and_spectra", "Sedimentation"),
+    log:
+        "logs/figures/phase_and_spectra.log",
+    params:
+        statistics_from=config["sedimentation"]["statistics_from"],
+        fit_frequencies=config["figures"]["fit_frequencies"],
+        spectrum=config["figures"]["spectrum"],
+    script:
+        "../scripts/figure_phase_and_spectra.py"
+
+
+rule figure_trajectories:
+    """Paths of the tracked particles, unwrapped."""
+    input:
+        series=expand("results/sedimentation/{case}.series.nc", case=LARGEST_CASES),
+        library=library("figure_trajectories.py"),
+    output:
+        **figure("trajectories", "Sedimentation"),
+    log:
+        "logs/figures/trajectories.log",
+    script:
+        "../scripts/figure_trajectories.py"
+
+
+rule figure_voronoi_pdf:
+    """P.d.f. of Voronoi volumes at each Galileo number."""
+    input:
+        trajectories=expand("results/sedimentation/{case}.nc", case=GALILEO_CASES),
+        library=library("figure_voronoi_pdf.py"),
+    output:
+        **figure("voronoi_pdf", "Sedimentation"),
+    log:
+        "logs/figures/voronoi_pdf.log",
+    benchmark:
+        "benchmarks/figures/voronoi_pdf.tsv"
+    params:
+        seed=config["seed"],
+        statistics_from=config["sedimentation"]["statistics_from"],
+        snapshots=config["figures"]["snapshots"],
+    script:
+        "../scripts/figure_voronoi_pdf.py"
+
+
+rule figure_voronoi_variance:
+    """Variance of Voronoi volumes against settling velocity."""
+    input:
+        steady="results/analysis/steady_state.csv",
+        trajectories=expand("results/sedimentation/{case}.nc", case=PLAIN_CASES),
+        library=library("figure_voronoi_variance.py"),
+    output:
+        **figure("voronoi_variance", "Sedimentation"),
+    log:
+        "logs/figures/voronoi_variance.log",
+    benchmark:
+        "benchmarks/figures/voronoi_variance.tsv"
+    params:
+        seed=config["seed"],
+        statistics_from=config["sedimentation"]["statistics_from"],
+        snapshots=config["figures"]["snapshots"],
+    script:
+        "../scripts/figure_voronoi_variance.py"
+
+
+rule figure_mesh_study:
+    """Drag on an isolated sphere against mesh size."""
+    input:
+        study="results/analysis/mesh_study.csv",
+        library=library("figure_mesh_study.py"),
+    output:
+        **figure("mesh_study", "Stokes solver"),
+    log:
+        "logs/figures/mesh_study.log",
+    script:
+        "../scripts/figure_mesh_study.py"

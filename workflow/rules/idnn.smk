@@ -1,0 +1,80 @@
+rule sweep:
+    """Cross-validate one configuration of layers for one component."""
+    input:
+        data="results/dataset/forces.h5",
+        library=library("sweep.py"),
+    output:
+        "results/sweep/{component}/{layers}.json",
+    log:
+        "logs/sweep/{component}/{layers}.log",
+    benchmark:
+        "benchmarks/sweep/{component}/{layers}.tsv"
+    params:
+        seed=config["seed"],
+        test_share=config["dataset"]["test_share"],
+        folds=config["idnn"]["folds"],
+        layers=lambda wc: plan.trial_layers(wc.layers),
+        radial_input=config["idnn"]["radial_input"],
+        training=config["idnn"]["training"],
+    script:
+        "../scripts/sweep.py"
+
+
+rule winner:
+    """Compare the configurations and choose one a component."""
+    input:
+        results=expand("results/sweep/{trial}.json", trial=TRIALS),
+        library=library("winner.py"),
+    output:
+        table=report(
+            "results/sweep/summary.csv", category="Force models", caption="../report/sweep.rst"
+        ),
+        winner="results/sweep/winner.json",
+    log:
+        "logs/winner.log",
+    script:
+        "../scripts/winner.py"
+
+
+rule model:
+    """Train one force model on both components."""
+    input:
+        data="results/dataset/forces.h5",
+        winner=lambda wc: "results/sweep/winner.json" if wc.model == "idnn" else [],
+        library=library("train.py"),
+    output:
+        "results/model/{model}.safetensors",
+    log:
+        "logs/model/{model}.log",
+    benchmark:
+        "benchmarks/model/{model}.tsv"
+    params:
+        seed=config["seed"],
+        test_share=config["dataset"]["test_share"],
+        layers=lambda wc: config["idnn"]["layers_of"].get(wc.model),
+        radial_input=config["idnn"]["radial_input"],
+        training=lambda wc: plan.training(config, wc.model),
+    script:
+        "../scripts/train.py"
+
+
+rule evaluation:
+    """Compare the force models on the scenes that none of them was trained on."""
+    input:
+        data="results/dataset/forces.h5",
+        models=expand("results/model/{model}.safetensors", model=LEARNED_MODELS),
+        library=library("evaluation.py"),
+    output:
+        table=report(
+            "results/model/evaluation.csv",
+            category="Force models",
+            caption="../report/evaluation.rst",
+        ),
+        predictions="results/model/predictions.h5",
+    log:
+        "logs/evaluation.log",
+    params:
+        seed=config["seed"],
+        test_share=config["dataset"]["test_share"],
+    script:
+        "../scripts/evaluation.py"

@@ -1,0 +1,30 @@
+rule sedimentation:
+    """Let the particles of one case settle."""
+    input:
+        model=branch(
+            config["sedimentation"]["model"] in LEARNED_MODELS,
+            then=f"results/model/{config['sedimentation']['model']}.safetensors",
+            otherwise=[],
+        ),
+        library=library("settle.py"),
+    output:
+        trajectory="results/sedimentation/{case}.nc",
+        series="results/sedimentation/{case}.series.nc",
+    log:
+        "logs/sedimentation/{case}.log",
+    benchmark:
+        "benchmarks/sedimentation/{case}.tsv"
+    params:
+        seed=lambda wc: plan.case_seed(config, wc.case),
+        model=config["sedimentation"]["model"],
+        particles=lambda wc: CASES[wc.case].particles,
+        volume_fraction=lambda wc: CASES[wc.case].volume_fraction,
+        galileo_multiple=lambda wc: CASES[wc.case].galileo_multiple,
+        change=config["sedimentation"]["galileo"]["change"],
+        properties=config["sedimentation"]["properties"],
+        start=config["sedimentation"]["start"],
+        step=config["sedimentation"]["step"],
+        duration=config["sedimentation"]["duration"],
+        save_every=config["sedimentation"]["save_every"],
+    script:
+        "../scripts/settle.py"

@@ -1,0 +1,17 @@
+"""Draw the p.d.f. of Voronoï volumes at each Galileo number."""
+
+from pathlib import Path
+
+import xarray as xr
+
+import joblog
+from dustfall.analysis.voronoi import voronoi_pdf_table
+from dustfall.figures.style import save
+from dustfall.figures.voronoi import voronoi_pdf
+
+joblog.start(snakemake.log[0])
+
+params = snakemake.params
+trajectories = [xr.open_dataset(path) for path in snakemake.input.trajectories]
+table = voronoi_pdf_table(trajectories, params.statistics_from, params.seed, params.snapshots)
+save(voronoi_pdf(table), table, Path(snakemake.output.png).with_suffix(""))

@@ -1,0 +1,22 @@
+"""Draw the variance of Voronoï volumes against the steady settling velocity."""
+
+from pathlib import Path
+
+import pandas as pd
+import xarray as xr
+
+import joblog
+from dustfall.analysis.voronoi import voronoi_variance_table
+from dustfall.figures.style import save
+from dustfall.figures.voronoi import voronoi_variance
+
+joblog.start(snakemake.log[0])
+
+params = snakemake.params
+steady = pd.read_csv(snakemake.input.steady, float_precision="round_trip")
+steady = steady[steady["quantity"] == "settling_velocity_mean"]
+trajectories = [xr.open_dataset(path) for path in snakemake.input.trajectories]
+table = voronoi_variance_table(
+    trajectories, steady, params.statistics_from, params.seed, params.snapshots
+)
+save(voronoi_variance(table), table, Path(snakemake.output.png).with_suffix(""))

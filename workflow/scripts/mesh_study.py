@@ -1,0 +1,14 @@
+"""Drag on an isolated sphere against mesh size, with observed orders and convergence index."""
+
+import joblog
+from dustfall.files import atomic
+from dustfall.stokes.mesh_study import convergence_table, mesh_study
+
+progress = joblog.start(snakemake.log[0])
+
+study = mesh_study(snakemake.params.sizes, progress("mesh study", "solves"))
+convergence = convergence_table(study)
+print(convergence.to_string(index=False))
+for table, target in ((study, snakemake.output.study), (convergence, snakemake.output.convergence)):
+    with atomic(target) as path:
+        table.to_csv(path, index=False)

@@ -1,0 +1,27 @@
+"""Cross-validate one configuration of layers for one component."""
+
+import json
+
+import joblog
+from dustfall.dataset import read, split
+from dustfall.files import atomic
+from dustfall.forces.cross_validation import cross_validate
+from dustfall.forces.training import TrainingSettings
+
+progress = joblog.start(snakemake.log[0])
+params = snakemake.params
+
+training, _ = split(read(snakemake.input.data), params.test_share, params.seed)
+result = cross_validate(
+    training.neighbours,
+    training.force,
+    snakemake.wildcards.component,
+    params.layers,
+    params.folds,
+    TrainingSettings(**params.training),
+    params.seed,
+    radial_input=params.radial_input,
+    progress=progress(f"{snakemake.wildcards.component} {params.layers}", "epochs"),
+)
+with atomic(snakemake.output[0]) as path:
+    path.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")

@@ -1,0 +1,27 @@
+"""Train one force model on both components."""
+
+import json
+from pathlib import Path
+
+import joblog
+from dustfall.dataset import read, split
+from dustfall.forces.training import TrainingSettings, train_model
+
+progress = joblog.start(snakemake.log[0])
+params = snakemake.params
+kind = snakemake.wildcards.model
+
+training, _ = split(read(snakemake.input.data), params.test_share, params.seed)
+layers = params.layers or json.loads(Path(snakemake.input.winner).read_text())["layers"]
+model = train_model(
+    kind,
+    training.neighbours,
+    training.force,
+    layers,
+    TrainingSettings(**params.training),
+    params.seed,
+    radial_input=params.radial_input,
+    progress=progress(f"{kind} {layers}", "epochs"),
+)
+print(json.dumps(model.header, indent=2))
+model.save(snakemake.output[0])
