@@ -1,5 +1,6 @@
 # The campaign: random scenes, boundary-element forces, force models, sedimentation, figures.
-# `snakemake -n` shows the plan, `snakemake all` runs it, `snakemake figures` makes the figures.
+# `snakemake -n` shows the plan, `snakemake all` runs it, `snakemake figures` makes the figures,
+# `snakemake benchmarks` times the Stokes solver.
 import json
 import os
 import sys
@@ -36,6 +37,7 @@ include: "workflow/rules/dataset.smk"
 include: "workflow/rules/idnn.smk"
 include: "workflow/rules/sedimentation.smk"
 include: "workflow/rules/figures.smk"
+include: "workflow/rules/benchmarks.smk"
 
 
 rule all:
@@ -52,6 +54,12 @@ rule figures:
     """The figures, and whatever they need."""
     input:
         FIGURES,
+
+
+rule benchmarks:
+    """Run time of the solver against its error; no part of `all`, as timings differ each time."""
+    input:
+        expand("results/benchmarks/{law}.csv", law=["uniform", "ball"]),
 
 
 rule configuration:
