@@ -174,6 +174,11 @@ def test_gmres_that_runs_out_is_reported_not_hidden(monkeypatch):
         forces_on_fixed_spheres(six(2.6))
 
 
+def test_a_tolerance_out_of_reach_is_said():
+    with pytest.warns(RuntimeWarning, match="exceeds the tolerance"):
+        forces_on_fixed_spheres(pair(2.01), tolerance=1e-5)
+
+
 def test_record_tells_the_smallest_gap():
     solution = solve(plan_scene(chain(3.0)), BODIES)
     assert solution.minimum_gap == pytest.approx(0.5)
