@@ -85,7 +85,7 @@ ORDER_OFFSET = 1.75
 def mesh_error(size, gap):
     """Relative force error of spheres meshed with edges `size` [radii] at a gap [d_p].
 
-    The traction peaks over a width of sqrt(gap * radius). Measured on three touching-close spheres
+    The traction peaks over a width of sqrt(gap * radius). Measured on three nearly touching spheres
     in a triangle, at gaps from 0.01 to 0.1 d_p, against meshes of half the size.
     """
     ratio = size / np.sqrt(np.maximum(gap, 1e-12) / RADIUS)
