@@ -14,7 +14,9 @@ def scenes():
     """Scenes of another seed than the campaign's, with forces by boundary elements."""
     neighbours, _ = random_scenes(2, "uniform", range(300), (1e-8, 1e-3))
     centres = np.concatenate([np.zeros((len(neighbours), 1, 3)), neighbours], axis=1)
-    return neighbours, np.array([forces_on_fixed_spheres(scene, tolerance=3e-4)[0] for scene in centres])
+    return neighbours, np.array(
+        [forces_on_fixed_spheres(scene, tolerance=3e-4)[0] for scene in centres]
+    )
 
 
 def unexplained(predicted, target):
