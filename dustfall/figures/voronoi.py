@@ -120,6 +120,6 @@ def voronoi_variance(frame: pd.DataFrame) -> Figure:
         Line2D([], [], color="k", ls="none", marker="o", mfc="none", label="random start")
     )
     handles.append(Line2D([], [], color=REFERENCE, lw=0.8, ls="--", label="random points"))
-    ax.legend(handles=handles, loc="upper left")
+    figure.legend(handles=handles, loc="outside right center")
     phi_legend(figure, frame["volume_fraction"])
     return figure
