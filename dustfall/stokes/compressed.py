@@ -72,9 +72,9 @@ def pair_coupling(shift, order, counts, points, harmonics):
 
 
 @njit(cache=True)
-def _scattered(centres, sizes, starts, orders, blocks, response, moments, out):
+def _scattered(sizes, starts, orders, blocks, response, moments, out):
     """out = moments + T K moments: the left side of the system."""
-    n = len(centres)
+    n = len(sizes)
     incoming = np.zeros(len(moments))
     pair = 0
     for i in range(n):
@@ -137,7 +137,7 @@ def solve_scene(centres, flow, orders, response, counts, points, harmonics, tole
         residual = 1.0
         while iterations < most and residual > tolerance:
             k = iterations
-            _scattered(centres, sizes, starts, orders, blocks, response, basis[k], basis[k + 1])
+            _scattered(sizes, starts, orders, blocks, response, basis[k], basis[k + 1])
             for i in range(k + 1):
                 h = np.sum(basis[i] * basis[k + 1])
                 hessenberg[i, k] = h
