@@ -10,7 +10,7 @@ from numpy.polynomial.legendre import leggauss
 
 from dustfall.stokes.mesh import SphereMesh
 from dustfall.stokes.quadrature import triangle_rule
-from dustfall.stokes.single_layer import RADIUS, _stokeslet
+from dustfall.stokes.single_layer import RADIUS, put_block, stokeslet
 
 
 def drag_on_isolated_sphere(mesh: SphereMesh, flat: bool) -> float:
@@ -69,7 +69,6 @@ def _assemble(x, width, singular, near, far):
     n = len(x)
     matrix = np.empty((3 * n, 3 * n))
     g, entry = np.empty(6), np.empty(6)
-    place = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
     for e in range(n):
         for f in range(n):
             distance = np.sqrt(np.sum((x[e] - x[f]) ** 2))
@@ -82,10 +81,8 @@ def _assemble(x, width, singular, near, far):
             entry[:] = 0.0
             for q in range(points.shape[1]):
                 y = points[f, q]
-                _stokeslet(x[e, 0] - y[0], x[e, 1] - y[1], x[e, 2] - y[2], g)
+                stokeslet(x[e, 0] - y[0], x[e, 1] - y[1], x[e, 2] - y[2], g)
                 for k in range(6):
                     entry[k] += weights[f, q] * g[k]
-            for i in range(3):
-                for j in range(3):
-                    matrix[3 * e + i, 3 * f + j] = entry[place[i, j]] / (8.0 * np.pi)
+            put_block(matrix, e, f, entry / (8.0 * np.pi))
     return matrix

@@ -15,7 +15,7 @@ from numba import njit
 from dustfall.stokes.harmonics import real_harmonics
 from dustfall.stokes.one_body import HARMONIC_DEGREE
 from dustfall.stokes.quadrature import sphere_rule
-from dustfall.stokes.single_layer import RADIUS, _stokeslet
+from dustfall.stokes.single_layer import RADIUS, put_block, stokeslet
 
 
 @cache
@@ -41,7 +41,7 @@ def pair_coupling(shift, order, counts, points, harmonics):
     half = np.zeros((count, size, 6))
     for p in range(count):
         for q in range(count):
-            _stokeslet(
+            stokeslet(
                 shift[0] + RADIUS * (x[p, 0] - x[q, 0]),
                 shift[1] + RADIUS * (x[p, 1] - x[q, 1]),
                 shift[2] + RADIUS * (x[p, 2] - x[q, 2]),
@@ -59,15 +59,7 @@ def pair_coupling(shift, order, counts, points, harmonics):
                 for k in range(6):
                     entry[k] += y[p, a] * half[p, b, k]
             entry /= 8.0 * np.pi
-            out[3 * a, 3 * b] = entry[0]
-            out[3 * a, 3 * b + 1] = entry[1]
-            out[3 * a, 3 * b + 2] = entry[2]
-            out[3 * a + 1, 3 * b] = entry[1]
-            out[3 * a + 1, 3 * b + 1] = entry[3]
-            out[3 * a + 1, 3 * b + 2] = entry[4]
-            out[3 * a + 2, 3 * b] = entry[2]
-            out[3 * a + 2, 3 * b + 1] = entry[4]
-            out[3 * a + 2, 3 * b + 2] = entry[5]
+            put_block(out, a, b, entry)
     return out
 
 

@@ -142,8 +142,8 @@ def response_template(sizes) -> int:
 def solve(plan: Plan, bodies, flow=(0.0, 1.0, 0.0), tolerance: float = 1e-4) -> Solution:
     """Solve a planned scene; bodies: the OneBody of every template, in the order of the plan."""
     flow = np.asarray(flow, dtype=float)
+    gap = float(_distances(plan.centres).min() - 1.0)
     if not np.any(flow):
-        gap = _distances(plan.centres).min(initial=np.inf) - 1.0
         return Solution(np.zeros_like(plan.centres), 0, 0.0, 0.0, gap, CONVERGED)
     goal = 0.01 * tolerance
     if np.any(plan.orders == NEAR):
@@ -154,7 +154,6 @@ def solve(plan: Plan, bodies, flow=(0.0, 1.0, 0.0), tolerance: float = 1e-4) -> 
             plan.centres, flow, plan.orders, response, *pair_rules(), goal, MOST_ITERATIONS
         )
     status = CONVERGED if residual <= goal and np.isfinite(force).all() else NOT_CONVERGED
-    gap = float(_distances(plan.centres).min() - 1.0)
     estimate = plan.error + residual
     return Solution(FORCE_UNIT * force, iterations, float(residual), estimate, gap, status)
 

@@ -83,7 +83,7 @@ def element_points(mesh: SphereMesh, rule: int):
 
 
 @njit(cache=True, inline="always")
-def _stokeslet(dx, dy, dz, out):
+def stokeslet(dx, dy, dz, out):
     """Six independent entries xx, xy, xz, yy, yz, zz of I/r + r r^T / r^3."""
     r2 = dx * dx + dy * dy + dz * dz
     inverse = 1.0 / np.sqrt(r2)
@@ -96,6 +96,17 @@ def _stokeslet(dx, dy, dz, out):
     out[5] = inverse + dz * dz * cube
 
 
+@njit(cache=True, inline="always")
+def put_block(matrix, a, b, entries):
+    """Write the six independent entries as the symmetric 3 x 3 block (a, b) of a matrix."""
+    matrix[3 * a, 3 * b] = entries[0]
+    matrix[3 * a + 1, 3 * b + 1] = entries[3]
+    matrix[3 * a + 2, 3 * b + 2] = entries[5]
+    matrix[3 * a, 3 * b + 1] = matrix[3 * a + 1, 3 * b] = entries[1]
+    matrix[3 * a, 3 * b + 2] = matrix[3 * a + 2, 3 * b] = entries[2]
+    matrix[3 * a + 1, 3 * b + 2] = matrix[3 * a + 2, 3 * b + 1] = entries[4]
+
+
 @njit(cache=True)
 def _add_point_pairs(shift, x, phi, wx, y, psi, wy, block):
     """block[a, b] += sum over points of wx phi_a(x) G(shift + RADIUS (x - y)) psi_b(y) wy."""
@@ -104,7 +115,7 @@ def _add_point_pairs(shift, x, phi, wx, y, psi, wy, block):
     for p in range(len(wx)):
         inner[:] = 0.0
         for q in range(len(wy)):
-            _stokeslet(
+            stokeslet(
                 shift[0] + RADIUS * (x[p, 0] - y[q, 0]),
                 shift[1] + RADIUS * (x[p, 1] - y[q, 1]),
                 shift[2] + RADIUS * (x[p, 2] - y[q, 2]),
@@ -126,7 +137,7 @@ def _add_matched_points(x, phi, y, psi, weights, block):
     """The same for points that come in pairs, as those of the Sauter-Schwab rule do."""
     g = np.empty(6)
     for p in range(len(weights)):
-        _stokeslet(
+        stokeslet(
             RADIUS * (x[p, 0] - y[p, 0]),
             RADIUS * (x[p, 1] - y[p, 1]),
             RADIUS * (x[p, 2] - y[p, 2]),
@@ -364,7 +375,7 @@ def _add_velocity(target, y, psi, nodes, velocity):
     g, leaf = np.empty((count, 6)), np.empty((SHAPES, 6))
     for k in range(len(y)):
         for q in range(count):
-            _stokeslet(target[0] - y[k, q, 0], target[1] - y[k, q, 1], target[2] - y[k, q, 2], g[q])
+            stokeslet(target[0] - y[k, q, 0], target[1] - y[k, q, 1], target[2] - y[k, q, 2], g[q])
         leaf[:] = 0.0
         for q in range(count):
             for b in range(SHAPES):
@@ -392,12 +403,7 @@ def _assemble_cross(shift, x, phi, nodes_x, y, psi, nodes_y):
     matrix = np.empty((3 * n, 3 * m))
     for a in range(n):
         for b in range(m):
-            e = entries[a, b]
-            matrix[3 * a, 3 * b], matrix[3 * a, 3 * b + 1] = e[0], e[1]
-            matrix[3 * a, 3 * b + 2], matrix[3 * a + 1, 3 * b] = e[2], e[1]
-            matrix[3 * a + 1, 3 * b + 1], matrix[3 * a + 1, 3 * b + 2] = e[3], e[4]
-            matrix[3 * a + 2, 3 * b], matrix[3 * a + 2, 3 * b + 1] = e[2], e[4]
-            matrix[3 * a + 2, 3 * b + 2] = e[5]
+            put_block(matrix, a, b, entries[a, b])
     return matrix
 
 
