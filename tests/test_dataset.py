@@ -47,7 +47,8 @@ def write_shards(folder, data: Dataset, size: int, unconverged=()) -> list[Shard
                     [part.force[:, None], np.full((len(part), 5, 3), 99.0)], axis=1
                 )
                 file["status"] = np.array([(law, k) in unconverged for k in part.scene], int)
-                for name in ("iterations", "residual", "error_estimate", "minimum_gap"):
+                file["error_estimate"] = np.arange(6.0 * len(part)).reshape(-1, 6)
+                for name in ("iterations", "residual", "minimum_gap"):
                     file[name] = np.arange(len(part), dtype=float)
             shards.append(shard)
     return shards

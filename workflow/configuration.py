@@ -166,12 +166,6 @@ def _check_physics(config: dict) -> None:
         f"scenes.phi_min is {scenes['phi_min']:g}, but must be below scenes.phi_max, "
         f"which is {scenes['phi_max']:g}.",
     )
-    sizes = config["meshing"]["template_sizes"]
-    _require(
-        sizes == sorted(sizes, reverse=True) and sizes[-1] <= 0.48,
-        f"meshing.template_sizes is {', '.join(map(_show, sizes))}, but must go from the coarsest "
-        "to the finest, the finest at most 0.48 radii.",
-    )
     drawn = sum(scenes["number"].values())
     fewest = 10 * config["idnn"]["folds"]
     _require(

@@ -1,126 +1,131 @@
-"""Spheres that see each other through few surface harmonics.
+"""Spheres that see each other through surface harmonics.
 
-The unknowns are the moments q_i of each sphere; the incoming flow at sphere i is that of the
-others and of infinity, q_i = T (u_inf - sum_j K_ij q_j). K_ij takes moments on sphere j to surface
-harmonics of the velocity on sphere i; it is integrated by a Lebedev rule on both spheres. The
-series of a pair converges geometrically in the inverse distance, so each pair gets the order that
-its distance and the tolerance ask for. The system is solved by GMRES.
+The unknowns are the traction moments q_i of each sphere. The incoming flow at sphere i is that of
+infinity less that of the others, so q_i = T (u_inf - sum_j K_ij q_j) with the one-body response T
+and the couplings K_ij of `translation`. The series of a pair converges geometrically, so each pair
+exchanges no more degrees than its distance and the tolerance ask for. GMRES solves the system,
+which the response preconditions by construction.
 """
-
-from functools import cache
 
 import numpy as np
 from numba import njit
 
-from dustfall.stokes.harmonics import real_harmonics
-from dustfall.stokes.one_body import HARMONIC_DEGREE
-from dustfall.stokes.quadrature import sphere_rule
-from dustfall.stokes.single_layer import RADIUS, put_block, stokeslet
-
-
-@cache
-def pair_rules() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """For each order: number of points (k,), points (k, q, 3), weighted harmonics (k, q, lm)."""
-    rules = [sphere_rule(max(3, 2 * order + 1)) for order in range(HARMONIC_DEGREE + 1)]
-    counts = np.array([len(weights) for _, weights in rules])
-    points = np.zeros((len(rules), counts.max(), 3))
-    harmonics = np.zeros((len(rules), counts.max(), (HARMONIC_DEGREE + 1) ** 2))
-    for order, (x, weights) in enumerate(rules):
-        points[order, : len(x)] = x
-        values = weights[:, None] * real_harmonics(order, x)
-        harmonics[order, : len(x), : values.shape[1]] = values
-    return counts, points, harmonics
+from dustfall.stokes.translation import (
+    axial_coupling,
+    block_sizes,
+    gather_azimuthal,
+    scatter_azimuthal,
+    turn_from_axis,
+    turn_to_axis,
+)
 
 
 @njit(cache=True)
-def pair_coupling(shift, order, counts, points, harmonics):
-    """K (3k, 3k), k = (order + 1)^2, for the centre distance `shift` = target - source [d_p]."""
-    count, size = counts[order], (order + 1) ** 2
-    x, y = points[order], harmonics[order]
-    g = np.empty(6)
-    half = np.zeros((count, size, 6))
-    for p in range(count):
-        for q in range(count):
-            stokeslet(
-                shift[0] + RADIUS * (x[p, 0] - x[q, 0]),
-                shift[1] + RADIUS * (x[p, 1] - x[q, 1]),
-                shift[2] + RADIUS * (x[p, 2] - x[q, 2]),
-                g,
-            )
-            for b in range(size):
-                for k in range(6):
-                    half[p, b, k] += g[k] * y[q, b]
-    out = np.zeros((3 * size, 3 * size))
-    entry = np.empty(6)
-    for a in range(size):
-        for b in range(size):
-            entry[:] = 0.0
-            for p in range(count):
-                for k in range(6):
-                    entry[k] += y[p, a] * half[p, b, k]
-            entry /= 8.0 * np.pi
-            put_block(out, a, b, entry)
-    return out
+def _add_pair(order, polar, azimuth, coupling, tables, q_i, q_j, u_i, u_j, field, spare, lines):
+    """Add to u_i, u_j the velocity that the traction of either sphere makes on the other."""
+    k = (order + 1) ** 2
+    for source, line in ((q_i, lines[0]), (q_j, lines[1])):
+        field[:k] = source[:k]
+        turn_to_axis(order, polar, azimuth, tables, field, spare)
+        gather_azimuthal(order, field, line)
+    from_i, from_j, at_i, at_j = lines
+    begin = first = 0
+    for size in block_sizes(order):
+        for row in range(size):
+            a, b = 0.0, 0.0
+            x, y = from_i[first + row, 0], from_i[first + row, 1]
+            for column in range(size):
+                v = coupling[begin + row * size + column]
+                a += v * from_j[first + column, 0]
+                b += v * from_j[first + column, 1]
+            at_i[first + row, 0], at_i[first + row, 1] = a, b
+        # The coupling seen from j is the transpose.
+        at_j[first : first + size] = 0.0
+        for row in range(size):
+            x, y = from_i[first + row, 0], from_i[first + row, 1]
+            for column in range(size):
+                v = coupling[begin + row * size + column]
+                at_j[first + column, 0] += v * x
+                at_j[first + column, 1] += v * y
+        begin += size * size
+        first += size
+    for target, line in ((u_i, at_i), (u_j, at_j)):
+        scatter_azimuthal(order, line, field)
+        turn_from_axis(order, polar, azimuth, tables, field, spare)
+        target[:k] += field[:k]
 
 
 @njit(cache=True)
-def _scattered(sizes, starts, orders, blocks, response, moments, out):
-    """out = moments + T K moments: the left side of the system."""
-    n = len(sizes)
-    incoming = np.zeros(len(moments))
-    pair = 0
-    for i in range(n):
+def _respond(degree, response, incoming, out):
+    """out += T incoming, for fields (k, 3)."""
+    data, indices, begin = response
+    for row in range(3 * (degree + 1) ** 2):
+        total = 0.0
+        for p in range(begin[row], begin[row + 1]):
+            column = indices[p]
+            total += data[p] * incoming[column // 3, column % 3]
+        out[row // 3, row % 3] += total
+
+
+@njit(cache=True)
+def _system(moments, degrees, starts, orders, pairs, couplings, response, tables, out):
+    """out = moments + T sum_j K_ij moments_j, for moments (total, 3)."""
+    largest = (np.max(degrees) + 1) ** 2
+    incoming = np.zeros(moments.shape)
+    field, spare = np.empty((largest, 3)), np.empty((largest, 3))
+    lines = np.empty((4, 3 * largest, 2))
+    p = 0
+    for i in range(len(degrees)):
         for j in range(i):
-            size = 3 * (orders[i, j] + 1) ** 2
-            block = blocks[pair]
-            pair += 1
-            si, sj = starts[i], starts[j]
-            for a in range(size):
-                total = 0.0
-                mine = moments[si + a]
-                for b in range(size):
-                    total += block[a, b] * moments[sj + b]
-                    incoming[sj + b] += block[a, b] * mine
-                incoming[si + a] += total
-    for i in range(n):
-        s = starts[i]
-        for a in range(sizes[i]):
-            total = 0.0
-            for b in range(sizes[i]):
-                total += response[a, b] * incoming[s + b]
-            out[s + a] = moments[s + a] + total
+            _add_pair(
+                orders[i, j], pairs[p, 1], pairs[p, 2], couplings[p], tables,
+                moments[starts[i] : starts[i + 1]], moments[starts[j] : starts[j + 1]],
+                incoming[starts[i] : starts[i + 1]], incoming[starts[j] : starts[j + 1]],
+                field, spare, lines,
+            )  # fmt: skip
+            p += 1
+    out[:] = moments
+    for i in range(len(degrees)):
+        own = slice(starts[i], starts[i + 1])
+        _respond(degrees[i], response, incoming[own], out[own])
 
 
 @njit(cache=True)
-def solve_scene(centres, flow, orders, response, counts, points, harmonics, tolerance, most):
-    """GMRES for one scene; returns forces (n, 3) [d_p, mu = 1], iterations, relative residual.
+def solve_scene(centres, flow, orders, response, tables, tolerance, most):
+    """GMRES for one scene; returns forces, iterations and relative residual.
 
-    orders: (n, n) symmetric order of each pair; most: largest number of iterations.
+    centres: (n, 3) [radii]. orders: (n, n) symmetric degree of each pair. response: data, indices
+    and row starts of T. most: largest number of iterations.
+    Forces (n, 3) are in units of mu, flow and radius.
     """
     n = len(centres)
-    sizes = np.empty(n, dtype=np.int64)
+    degrees = np.zeros(n, dtype=np.int64)
+    starts = np.zeros(n + 1, dtype=np.int64)
     for i in range(n):
-        largest = 0
         for j in range(n):
             if j != i:
-                largest = max(largest, orders[i, j])
-        sizes[i] = 3 * (largest + 1) ** 2
-    starts = np.zeros(n + 1, dtype=np.int64)
-    starts[1:] = np.cumsum(sizes)
-    blocks = [
-        pair_coupling(centres[i] - centres[j], orders[i, j], counts, points, harmonics)
-        for i in range(n)
-        for j in range(i)
-    ]
-    total = starts[n]
-    right = np.zeros(total)
+                degrees[i] = max(degrees[i], orders[i, j])
+        starts[i + 1] = starts[i] + (degrees[i] + 1) ** 2
+    count = n * (n - 1) // 2
+    pairs, p = np.empty((count, 3)), 0
+    couplings = [np.empty(0) for _ in range(count)]
     for i in range(n):
-        for a in range(sizes[i]):
-            for c in range(3):
-                right[starts[i] + a] += response[a, c] * flow[c] * np.sqrt(4.0 * np.pi)
-    solution, iterations, residual = np.zeros(total), 0, 0.0
+        for j in range(i):
+            shift = centres[i] - centres[j]
+            distance = np.sqrt(np.sum(shift**2))
+            across = np.sqrt(shift[0] ** 2 + shift[1] ** 2)
+            pairs[p] = distance, np.arctan2(across, shift[2]), np.arctan2(shift[1], shift[0])
+            couplings[p] = axial_coupling(orders[i, j], distance, tables)
+            p += 1
+
+    uniform, right = np.zeros((starts[n], 3)), np.zeros((starts[n], 3))
+    for i in range(n):
+        uniform[starts[i]] = np.sqrt(4.0 * np.pi) * flow
+        own = slice(starts[i], starts[i + 1])
+        _respond(degrees[i], response, uniform[own], right[own])
+    solution, iterations, residual = np.zeros_like(right), 0, 0.0
     if n > 1:
-        basis = np.zeros((most + 1, total))
+        basis = np.zeros((most + 1, *right.shape))
         hessenberg = np.zeros((most + 1, most))
         cosines, sines, target = np.zeros(most), np.zeros(most), np.zeros(most + 1)
         norm = np.sqrt(np.sum(right**2))
@@ -129,7 +134,9 @@ def solve_scene(centres, flow, orders, response, counts, points, harmonics, tole
         residual = 1.0
         while iterations < most and residual > tolerance:
             k = iterations
-            _scattered(sizes, starts, orders, blocks, response, basis[k], basis[k + 1])
+            _system(
+                basis[k], degrees, starts, orders, pairs, couplings, response, tables, basis[k + 1]
+            )
             for i in range(k + 1):
                 h = np.sum(basis[i] * basis[k + 1])
                 hessenberg[i, k] = h
@@ -158,8 +165,8 @@ def solve_scene(centres, flow, orders, response, counts, points, harmonics, tole
         for i in range(iterations):
             solution += weights[i] * basis[i]
     else:
-        solution = right
+        solution[:] = right
     forces = np.empty((n, 3))
     for i in range(n):
-        forces[i] = np.sqrt(4.0 * np.pi) * solution[starts[i] : starts[i] + 3]
+        forces[i] = np.sqrt(4.0 * np.pi) * solution[starts[i]]
     return forces, iterations, residual

@@ -1,9 +1,11 @@
 """The one-body operator: how a lone fixed sphere answers any incoming flow.
 
-Every sphere is the same body, so its single-layer matrix is factored once for a template mesh and
-used for every sphere of every scene. Seen from afar a sphere is described by few numbers: the
-incoming velocity enters through its surface harmonics u_lm, the traction leaves through its
-moments q_lm = integral of f Y_lm dS, and the response q = T u is a small matrix.
+Every sphere is the same body, so its single-layer matrix is assembled and factored once for a
+template mesh and serves every sphere of every scene. Seen by others a sphere is described by few
+numbers: the incoming velocity enters through its surface harmonics u_lm, the traction leaves
+through its moments q_lm = integral of f Y_lm dS. The answer of a sphere commutes with rotations,
+so on each degree and total momentum (`harmonics`) it is a number: the mesh's answer, averaged over
+all orientations of the mesh.
 """
 
 from dataclasses import dataclass
@@ -13,28 +15,28 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from dustfall.files import atomic
-from dustfall.stokes.harmonics import real_harmonics
+from dustfall.stokes.harmonics import axes_swapped, real_harmonics, total_momentum_projectors
 from dustfall.stokes.mesh import SphereMesh
-from dustfall.stokes.single_layer import nodal_integrals, self_interaction
+from dustfall.stokes.single_layer import RADIUS, nodal_integrals, self_interaction
 
-HARMONIC_DEGREE = 10
-"""Largest degree of the harmonics through which a sphere answers in compressed form."""
+RESPONSE_DEGREE = 10
+"""Largest degree of the harmonics for which a template's answer is computed."""
 
 
 @dataclass(frozen=True)
 class OneBody:
-    """A template mesh with its factored single-layer matrix and its compressed response.
+    """A template mesh with its factored single-layer matrix and its answer to harmonics.
 
     mesh: the template. factor: lower Cholesky factor (3n, 3n) of the single-layer matrix, to
     which the outer product of the nodal normals is added: an incompressible flow never excites
     them, and without it the matrix would be singular (the net flux through a sphere is zero
-    whatever the pressure inside). moments: (n, (degree + 1)^2), moments = sum_a moments[a] f_a.
-    response: (3k, 3k), k = (degree + 1)^2; row 3 lm + i is harmonic lm, direction i.
+    whatever the pressure inside). response: (RESPONSE_DEGREE + 1, 3), moments for unit incoming
+    harmonics of degree n and total momentum J = n - 1, n, n + 1; lengths in radii, mu = 1. Zero
+    where there is no such field, and for the normal (n = 1, J = 0), which no flow excites.
     """
 
     mesh: SphereMesh
     factor: np.ndarray
-    moments: np.ndarray
     response: np.ndarray
 
     @classmethod
@@ -44,10 +46,10 @@ class OneBody:
         normals = nodal_integrals(mesh, lambda n: n).ravel()
         factor, _ = cho_factor(matrix + np.outer(normals, normals), lower=True)
         factor = np.tril(factor)
-        moments = nodal_integrals(mesh, lambda n: real_harmonics(HARMONIC_DEGREE, n))
+        moments = nodal_integrals(mesh, lambda n: real_harmonics(RESPONSE_DEGREE, n))
         spread = np.kron(moments, np.eye(3))
-        response = spread.T @ cho_solve((factor, True), spread)
-        return cls(mesh, factor, moments, 0.5 * (response + response.T))
+        answer = spread.T @ cho_solve((factor, True), spread) / RADIUS
+        return cls(mesh, factor, _rotational_average(answer))
 
     def solve(self, load):
         """Nodal tractions (3n, ...) for the weighted incoming velocities <phi_a, u> (3n, ...)."""
@@ -55,16 +57,18 @@ class OneBody:
 
     def drag(self) -> float:
         """Force along a unit flow on a lone sphere [mu U d_p], exactly 3 pi on a perfect mesh."""
-        return 4.0 * np.pi * float(self.response[1, 1])
+        return 4.0 * np.pi * RADIUS * float(self.response[0, 2])
 
     def save(self, path) -> None:
         """Write the mesh and its operator to an HDF5 file."""
         with atomic(path) as temporary, h5py.File(temporary, "w") as file:
-            file.attrs["content"] = "one-body operator; lengths in d_p, mu = 1, traction along flow"
+            file.attrs["content"] = (
+                "one-body operator; mu = 1. factor: of the single-layer matrix, lengths in d_p; "
+                "response: by degree and total momentum, lengths in radii"
+            )
             file["vertices"] = self.mesh.vertices
             file["triangles"] = self.mesh.triangles
             file["factor"] = self.factor
-            file["moments"] = self.moments
             file["response"] = self.response
 
     @classmethod
@@ -72,4 +76,16 @@ class OneBody:
         """Read what `save` wrote."""
         with h5py.File(path) as file:
             mesh = SphereMesh(file["vertices"][:], file["triangles"][:])
-            return cls(mesh, *(file[name][:] for name in ("factor", "moments", "response")))
+            return cls(mesh, file["factor"][:], file["response"][:])
+
+
+def _rotational_average(answer) -> np.ndarray:
+    """The mean over all rotations of an answer (3k, 3k), by Schur's lemma: traces on subspaces."""
+    swap = axes_swapped(RESPONSE_DEGREE)
+    response = np.zeros((RESPONSE_DEGREE + 1, 3))
+    for n in range(RESPONSE_DEGREE + 1):
+        own = slice(3 * n * n, 3 * (n + 1) ** 2)
+        for total, projector in total_momentum_projectors(n, swap).items():
+            response[n, total - n + 1] = np.sum(projector * answer[own, own]) / (2 * total + 1)
+    response[1, 0] = 0.0
+    return response

@@ -1,7 +1,7 @@
 rule solver_benchmark:
     """Run time of the Stokes solver against the error of the force."""
     input:
-        operators=expand("results/operators/sphere-{size}.h5", size=TEMPLATES),
+        operator=f"results/operators/{TEMPLATE}.h5",
         library=library("solver_benchmark.py"),
     output:
         "results/benchmarks/{law}.csv",
@@ -13,7 +13,6 @@ rule solver_benchmark:
         scenes=config["benchmarks"]["scenes"],
         phi_min=config["scenes"]["phi_min"],
         phi_max=config["scenes"]["phi_max"],
-        sizes=TEMPLATES,
         tolerances=config["benchmarks"]["tolerances"],
     script:
         "../scripts/solver_benchmark.py"

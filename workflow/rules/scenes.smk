@@ -1,4 +1,4 @@
-TEMPLATES = config["meshing"]["template_sizes"]
+TEMPLATE = "sphere-{}".format(config["meshing"]["template_size"])
 
 
 rule scenes:
@@ -31,10 +31,10 @@ rule templates:
 
 
 rule meshes:
-    """Choose the template at every centre and the coupling of every pair of a shard."""
+    """Place the template in the scenes of a shard and choose what every pair exchanges."""
     input:
         scenes="results/scenes/{law}-{shard}.h5",
-        templates=expand("results/templates/sphere-{size}.h5", size=TEMPLATES),
+        template=f"results/templates/{TEMPLATE}.h5",
         library=library("meshes.py"),
     output:
         "results/meshes/{law}-{shard}.h5",

@@ -17,7 +17,7 @@ rule stokes:
     """Solve the Stokes problem of every scene of a shard."""
     input:
         meshes="results/meshes/{law}-{shard}.h5",
-        operators=expand("results/operators/sphere-{size}.h5", size=TEMPLATES),
+        operator=f"results/operators/{TEMPLATE}.h5",
         library=library("solve.py"),
     output:
         "results/stokes/{law}-{shard}.h5",

@@ -3,23 +3,24 @@
 import numpy as np
 
 import joblog
-from dustfall.stokes.many_body import CONVERGED
+from dustfall.stokes.many_body import NOT_CONVERGED, OUT_OF_REACH, one_body_response
 from dustfall.stokes.one_body import OneBody
 from dustfall.stokes.records import read_plans, solve_shard, write_records
 
 progress = joblog.start(snakemake.log[0])
 
 plans, scene = read_plans(snakemake.input.meshes)
-bodies = [OneBody.load(path) for path in snakemake.input.operators]
-records = solve_shard(
-    plans, bodies, snakemake.params.tolerance, progress("Stokes solves", "scenes")
-)
+tolerance = snakemake.params.tolerance
+response = one_body_response(OneBody.load(snakemake.input.operator), tolerance)
+records = solve_shard(plans, response, tolerance, progress("Stokes solves", "scenes"))
 write_records(snakemake.output[0], records, scene)
 
-failed = np.flatnonzero(records["status"] != CONVERGED)
-print(f"{len(plans) - len(failed)} of {len(plans)} scenes converged")
-for k in failed:
-    print(
-        f"scene {scene[k]} did not converge: residual {records['residual'][k]:.1e}, "
-        f"smallest gap {records['minimum_gap'][k]:.1e} d_p"
-    )
+sentences = {NOT_CONVERGED: "did not converge", OUT_OF_REACH: "is not resolved to the tolerance"}
+for status, sentence in sentences.items():
+    for k in np.flatnonzero(records["status"] == status):
+        print(
+            f"scene {scene[k]} {sentence}: residual {records['residual'][k]:.1e}, error estimate "
+            f"{records['error_estimate'][k].max():.1e}, smallest gap "
+            f"{records['minimum_gap'][k]:.1e} d_p"
+        )
+print(f"{len(plans)} scenes, {np.sum(records['status'] != NOT_CONVERGED)} converged")

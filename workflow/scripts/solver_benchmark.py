@@ -12,9 +12,9 @@ params = snakemake.params
 neighbours, phi = random_scenes(
     params.seed, params.law, range(params.scenes), (params.phi_min, params.phi_max)
 )
-bodies = [OneBody.load(path) for path in snakemake.input.operators]
+body = OneBody.load(snakemake.input.operator)
 table = time_against_error(
-    neighbours, phi, params.sizes, bodies, params.tolerances, progress=progress("benchmark", "rows")
+    neighbours, phi, body, params.tolerances, progress=progress("benchmark", "rows")
 )
 print(table.to_string(index=False))
 with atomic(snakemake.output[0]) as path:

@@ -1,0 +1,285 @@
+"""The flow that a traction on one sphere makes on another, exactly, harmonic by harmonic.
+
+Lengths are in radii, mu = 1. Seen along the line of centres the coupling of two spheres does not
+mix azimuthal numbers: each total number M has its own small real matrix, which depends on the
+distance alone. With the potentials Phi_c of the traction's components f_c and Psi of y.f, the
+velocity is u_c = (Phi_c - x . d_c Phi + d_c Psi) / 8 pi, since G = I/r - (x - y) grad 1/r; the
+potentials are moved from one centre to the other as those of electrostatics are, and gradients
+and products with x act on solid harmonics by short recurrences.
+
+Within the number M the z component has harmonics of order M, and the combinations
+(f_x +- i f_y) / sqrt 2 those of order M +- 1. Harmonics are Z_lm = N P_l^|m| exp(i m phi) without
+the Condon-Shortley sign; real and imaginary parts do not mix.
+"""
+
+from functools import cache
+
+import numpy as np
+from numba import njit
+from scipy.special import comb
+
+from dustfall.stokes.harmonics import axes_swapped
+
+MOST_DEGREE = 40
+"""Largest degree of the harmonics that a pair may exchange."""
+
+_COMPONENTS = (0, 1, -1)
+"""Azimuthal number that a component adds: z, (x + iy) / sqrt 2, (x - iy) / sqrt 2."""
+
+
+@cache
+def translation_tables():
+    """What does not depend on the pair: moved potentials, gradients, products, swapped axes."""
+    size = MOST_DEGREE + 3
+    m, to, of = np.ogrid[:size, :size, :size]
+    # Z_lm / r^(l+1) about a centre at the distance 1, in the regular solid harmonics about here.
+    moved = np.sqrt(comb(of + to, of + m) * comb(of + to, of - m) * (2 * of + 1) / (2 * to + 1))
+    moved = np.where((m <= to) & (m <= of), moved * (-1.0) ** (to + m), 0.0)
+    moved *= 4.0 * np.pi / (2 * of + 1)
+
+    # Arrays [component, m + 2, l]: m starts at -2.
+    m = np.arange(-2, size)[:, None]
+    l = np.arange(size)[None, :]  # noqa: E741 - the field's letter
+    root = np.vectorize(lambda v: np.sqrt(max(v, 0.0)))
+    raised, lowered = np.where(m >= 0, -1.0, 1.0), np.where(m >= 1, -1.0, 1.0)
+    inside = np.abs(m) <= l
+    ratio = (2 * l + 1.0) / np.maximum(2 * l - 1.0, 1.0)
+    gradient = np.stack(
+        [
+            root(ratio * (l - m) * (l + m)),
+            raised * root(ratio * (l - m) * (l - m - 1)),
+            -lowered * root(ratio * (l + m) * (l + m - 1)),
+        ]
+    )
+    above, below = (2 * l + 1.0) * (2 * l + 3.0), np.maximum(4.0 * l * l - 1.0, 1.0)
+    up = np.stack(
+        [
+            root(((l + 1) ** 2 - m * m) / above),
+            -raised * root((l + m + 1) * (l + m + 2) / above),
+            lowered * root((l - m + 1) * (l - m + 2) / above),
+        ]
+    )
+    down = np.stack(
+        [
+            root((l * l - m * m) / below),
+            raised * root((l - m) * (l - m - 1) / below),
+            -lowered * root((l + m) * (l + m - 1) / below),
+        ]
+    )
+    swap = axes_swapped(MOST_DEGREE)
+    return (
+        moved,
+        np.where(inside, gradient, 0.0),
+        np.where(inside, up, 0.0),
+        np.where(inside, down, 0.0),
+        swap.data,
+        swap.indices.astype(np.int64),
+        swap.indptr.astype(np.int64),
+    )
+
+
+@njit(cache=True)
+def block_sizes(order):
+    """Number of coefficients of each total azimuthal number M = 0 ... order + 1."""
+    sizes = np.zeros(order + 2, dtype=np.int64)
+    for total in range(order + 2):
+        for step in _COMPONENTS:
+            sizes[total] += max(0, order + 1 - abs(total + step))
+    return sizes
+
+
+@njit(cache=True)
+def _gradient(step, m, solid, gradient, out):
+    """Coefficients of order m + step of d_step applied to regular solid harmonics of order m."""
+    out[:] = 0.0
+    for l in range(max(abs(m), 1), len(solid)):  # noqa: E741
+        out[l - 1] = gradient[step, m + 2, l] * solid[l]
+
+
+@njit(cache=True)
+def _times(step, m, values, up, down, out):
+    """Coefficients of order m + step of x_step times harmonics of order m on the unit sphere."""
+    out[:] = 0.0
+    for l in range(abs(m), len(values)):  # noqa: E741
+        if values[l] != 0.0:
+            if l + 1 < len(values):
+                out[l + 1] += up[step, m + 2, l] * values[l]
+            if l > 0:
+                out[l - 1] += down[step, m + 2, l] * values[l]
+
+
+@njit(cache=True)
+def axial_coupling(order, distance, tables):
+    """Matrices of the numbers M = 0, 1, ... of a pair along z, row by row one after the other.
+
+    Rows: velocity on the sphere at (0, 0, distance); columns: traction on that at the origin.
+    """
+    moved, gradient, up, down, _, _, _ = tables
+    sizes = block_sizes(order)
+    out = np.zeros(np.sum(sizes**2))
+    length = order + 3
+    powers = distance ** -np.arange(2.0 * length + 1.0)
+    one, source = np.empty(length), np.empty(length)
+    phi, psi = np.empty(length), np.empty(length)
+    slope, product, velocity = np.empty(length), np.empty(length), np.empty((3, length))
+    begin = 0
+    for total in range(order + 2):
+        size = sizes[total]
+        column = 0
+        for s in range(3):
+            m = total + _COMPONENTS[s]
+            # a.b = a_z b_z + (a_+ b_- + a_- b_+) in the scaled components: the partner of s.
+            partner = (3 - s) % 3
+            for l in range(abs(m), order + 1):  # noqa: E741
+                one[:] = 0.0
+                one[l] = 1.0
+                _times(partner, m, one, up, down, source)
+                scale = 1.0 if s == 0 else np.sqrt(0.5)
+                for t in range(length):
+                    phi[t] = moved[abs(m), t, l] * powers[l + t + 1]
+                    psi[t] = moved[total, t, l + 1] * powers[l + t + 2] * source[l + 1]
+                    if l > 0:
+                        psi[t] += moved[total, t, l - 1] * powers[l + t] * source[l - 1]
+                    psi[t] *= scale
+                velocity[:] = 0.0
+                velocity[s] = phi
+                for r in range(3):
+                    weight = 1.0 if r == 0 else np.sqrt(0.5)
+                    _gradient(r, m, phi, gradient, slope)
+                    _times(partner, m + _COMPONENTS[r], slope, up, down, product)
+                    velocity[r] -= weight * scale * product
+                    if s == 0:
+                        velocity[r] -= weight * distance * slope
+                    _gradient(r, total, psi, gradient, slope)
+                    velocity[r] += weight * slope
+                row = 0
+                for r in range(3):
+                    for t in range(abs(total + _COMPONENTS[r]), order + 1):
+                        out[begin + row * size + column] = velocity[r, t] / (8.0 * np.pi)
+                        row += 1
+                column += 1
+        begin += size * size
+    return out
+
+
+@njit(cache=True)
+def _turned_about_z(order, angle, field):
+    """Turn a vector field, harmonics and components, about z by an angle, in place."""
+    for n in range(1, order + 1):
+        middle = n * n + n
+        for m in range(1, n + 1):
+            c, s = np.cos(m * angle), np.sin(m * angle)
+            for i in range(3):
+                even, odd = field[middle + m, i], field[middle - m, i]
+                field[middle + m, i] = c * even - s * odd
+                field[middle - m, i] = s * even + c * odd
+    c, s = np.cos(angle), np.sin(angle)
+    for k in range((order + 1) ** 2):
+        x, y = field[k, 0], field[k, 1]
+        field[k, 0] = c * x - s * y
+        field[k, 1] = s * x + c * y
+
+
+@njit(cache=True)
+def _axes_swapped(order, field, tables, out):
+    """The field with y and z exchanged, harmonics and components."""
+    _, _, _, _, data, indices, begin = tables
+    for k in range((order + 1) ** 2):
+        x = y = z = 0.0
+        for p in range(begin[k], begin[k + 1]):
+            v, other = data[p], indices[p]
+            x += v * field[other, 0]
+            z += v * field[other, 1]
+            y += v * field[other, 2]
+        out[k, 0], out[k, 1], out[k, 2] = x, y, z
+
+
+@njit(cache=True)
+def turn_to_axis(order, polar, azimuth, tables, field, spare):
+    """Turn the frame so that the direction (polar, azimuth) becomes z; field (k, 3), in place."""
+    _turned_about_z(order, -azimuth, field)
+    _axes_swapped(order, field, tables, spare)
+    _turned_about_z(order, polar, spare)
+    _axes_swapped(order, spare, tables, field)
+
+
+@njit(cache=True)
+def turn_from_axis(order, polar, azimuth, tables, field, spare):
+    """Undo `turn_to_axis`."""
+    _axes_swapped(order, field, tables, spare)
+    _turned_about_z(order, -polar, spare)
+    _axes_swapped(order, spare, tables, field)
+    _turned_about_z(order, azimuth, field)
+
+
+@njit(cache=True)
+def gather_azimuthal(order, field, out):
+    """Write a field (k, 3) as its azimuthal numbers: out (size, 2), real and imaginary parts.
+
+    With F_m = (cosine - i sine) / sqrt 2 for m > 0 and its conjugate for -m.
+    """
+    half = np.sqrt(0.5)
+    p = 0
+    for total in range(order + 2):
+        for n in range(total, order + 1):
+            k = n * n + n
+            if total == 0:
+                out[p, 0], out[p, 1] = field[k, 2], 0.0
+            else:
+                out[p, 0], out[p, 1] = half * field[k + total, 2], -half * field[k - total, 2]
+            p += 1
+        m = total + 1
+        for n in range(m, order + 1):
+            k = n * n + n
+            # (F^x + i F^y) / sqrt 2, and F = (c - i s) / sqrt 2.
+            out[p, 0] = 0.5 * (field[k + m, 0] + field[k - m, 1])
+            out[p, 1] = 0.5 * (field[k + m, 1] - field[k - m, 0])
+            p += 1
+        m = total - 1
+        for n in range(abs(m), order + 1):
+            k = n * n + n
+            if m == 0:
+                out[p, 0], out[p, 1] = half * field[k, 0], -half * field[k, 1]
+            elif m > 0:
+                out[p, 0] = 0.5 * (field[k + m, 0] - field[k - m, 1])
+                out[p, 1] = -0.5 * (field[k + m, 1] + field[k - m, 0])
+            else:
+                out[p, 0] = 0.5 * (field[k + 1, 0] + field[k - 1, 1])
+                out[p, 1] = -0.5 * (field[k + 1, 1] - field[k - 1, 0])
+            p += 1
+
+
+@njit(cache=True)
+def scatter_azimuthal(order, values, field):
+    """Undo `gather_azimuthal`."""
+    half = np.sqrt(0.5)
+    field[: (order + 1) ** 2] = 0.0
+    p = 0
+    for total in range(order + 2):
+        for n in range(total, order + 1):
+            k = n * n + n
+            if total == 0:
+                field[k, 2] = values[p, 0]
+            else:
+                field[k + total, 2] = values[p, 0] / half
+                field[k - total, 2] = -values[p, 1] / half
+            p += 1
+        m = total + 1
+        for n in range(m, order + 1):
+            k = n * n + n
+            field[k + m, 0] += values[p, 0]
+            field[k - m, 1] += values[p, 0]
+            field[k + m, 1] += values[p, 1]
+            field[k - m, 0] -= values[p, 1]
+            p += 1
+        m = total - 1
+        for n in range(abs(m), order + 1):
+            k = n * n + n
+            if m == 0:
+                field[k, 0], field[k, 1] = values[p, 0] / half, -values[p, 1] / half
+            elif m > 0:
+                field[k + m, 0] += values[p, 0]
+                field[k - m, 1] -= values[p, 0]
+                field[k + m, 1] -= values[p, 1]
+                field[k - m, 0] -= values[p, 1]
+            p += 1
