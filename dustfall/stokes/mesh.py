@@ -1,12 +1,13 @@
 """Triangular surface meshes of a sphere, made by gmsh. They know nothing of physics."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import gmsh
 import numpy as np
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SphereMesh:
     """Triangles whose vertices lie on the unit sphere.
 
@@ -18,12 +19,22 @@ class SphereMesh:
     vertices: np.ndarray
     triangles: np.ndarray
 
-    @property
+    @cached_property
     def edges(self) -> np.ndarray:
         """(n_edges, 2) vertex numbers, each edge once, the lower number first."""
-        t = self.triangles
-        sides = np.sort(np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]]), axis=1)
-        return np.unique(sides, axis=0)
+        return self._edges_and_sides[0]
+
+    @cached_property
+    def quadratic_nodes(self) -> np.ndarray:
+        """(n_triangles, 6) nodes of each element: its vertices, then the middles of 01, 12, 20."""
+        return np.column_stack([self.triangles, len(self.vertices) + self._edges_and_sides[1]])
+
+    @cached_property
+    def _edges_and_sides(self):
+        """Edges, and the number of the edge on each side of each triangle."""
+        sides = np.sort(self.triangles[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
+        edges, numbers = np.unique(sides, axis=0, return_inverse=True)
+        return edges, numbers.reshape(-1, 3)
 
     def solid_angles(self) -> np.ndarray:
         """(n_triangles,) solid angle of each element [sr] (van Oosterom and Strackee 1983)."""

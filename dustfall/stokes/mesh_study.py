@@ -6,16 +6,10 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import brentq
 
-from dustfall.stokes.collocation import drag_on_isolated_sphere
-from dustfall.stokes.many_body import FORCE_UNIT
+from dustfall.stokes.boundary_elements import SCHEMES, forces_by_elements
 from dustfall.stokes.mesh import sphere_mesh
-from dustfall.stokes.one_body import OneBody
 
-SCHEMES = {
-    "constant, flat elements": lambda mesh: drag_on_isolated_sphere(mesh, flat=True),
-    "constant, projected elements": lambda mesh: drag_on_isolated_sphere(mesh, flat=False),
-    "quadratic Galerkin, projected elements": lambda mesh: OneBody.from_mesh(mesh).drag(),
-}
+ISOLATED = np.zeros((1, 3))
 
 
 def mesh_study(sizes: Sequence[float], progress=None) -> pd.DataFrame:
@@ -27,8 +21,8 @@ def mesh_study(sizes: Sequence[float], progress=None) -> pd.DataFrame:
     rows = []
     for size in sorted(sizes, reverse=True):
         mesh = sphere_mesh(size)
-        for scheme, drag in SCHEMES.items():
-            force = FORCE_UNIT * drag(mesh)
+        for scheme in SCHEMES:
+            force = forces_by_elements(ISOLATED, mesh, scheme, tolerance=1e-8)[0, 1]
             rows.append((scheme, size, len(mesh.vertices), len(mesh.triangles), force))
             if progress is not None:
                 progress(len(rows), len(sizes) * len(SCHEMES))

@@ -13,24 +13,21 @@ far apart as it is wide.
 import numpy as np
 from numba import njit
 
+from dustfall.stokes.element import (
+    MOST_HALVINGS,
+    MOST_PARTS,
+    centre_and_reach,
+    parts_facing,
+    place_points,
+    quarter,
+    share_of_area,
+)
 from dustfall.stokes.mesh import SphereMesh
 from dustfall.stokes.quadrature import touching_pair_rule, triangle_rule
-
-RADIUS = 0.5
-"""Radius of every sphere [d_p]."""
+from dustfall.stokes.spheres import RADIUS
 
 SHAPES = 6
 """Quadratic shape functions on an element: three vertices, then edges 01, 12, 20."""
-
-
-def dof_numbers(mesh: SphereMesh) -> np.ndarray:
-    """(n_triangles, 6) number of the node behind each local shape function: vertices, edges."""
-    edges = mesh.edges
-    number = {tuple(edge): len(mesh.vertices) + k for k, edge in enumerate(edges.tolist())}
-    t = mesh.triangles
-    sides = [np.sort(t[:, pair], axis=1).tolist() for pair in ([0, 1], [1, 2], [2, 0])]
-    midpoints = [[number[tuple(side)] for side in column] for column in sides]
-    return np.column_stack([t, *midpoints])
 
 
 @njit(cache=True, inline="always")
@@ -45,24 +42,10 @@ def _shape_functions(l0, l1, l2, out):
 
 @njit(cache=True)
 def _points_on(corners, barycentric, position, shape, density):
-    """Project barycentric points of one element: unit vectors, shape functions, dS per weight."""
-    a, b, c = corners
-    triple = (
-        a[0] * (b[1] * c[2] - b[2] * c[1])
-        + a[1] * (b[2] * c[0] - b[0] * c[2])
-        + a[2] * (b[0] * c[1] - b[1] * c[0])
-    )
+    """Points of one projected element: unit vectors, shape functions, dS per unit of weight."""
+    place_points(corners, barycentric, False, position, density)
     for q in range(len(barycentric)):
         l0, l1, l2 = barycentric[q]
-        x = l0 * a[0] + l1 * b[0] + l2 * c[0]
-        y = l0 * a[1] + l1 * b[1] + l2 * c[1]
-        z = l0 * a[2] + l1 * b[2] + l2 * c[2]
-        r = np.sqrt(x * x + y * y + z * z)
-        position[q, 0] = x / r
-        position[q, 1] = y / r
-        position[q, 2] = z / r
-        # Solid angle per area of the flat element: its plane is triple / (2 area) from the origin.
-        density[q] = 0.5 * triple / (r * r * r)
         _shape_functions(l0, l1, l2, shape[q])
 
 
@@ -108,17 +91,17 @@ def put_block(matrix, a, b, entries):
 
 
 @njit(cache=True)
-def _add_point_pairs(shift, x, phi, wx, y, psi, wy, block):
-    """block[a, b] += sum over points of wx phi_a(x) G(shift + RADIUS (x - y)) psi_b(y) wy."""
+def _add_point_pairs(x, phi, wx, y, psi, wy, block):
+    """block[a, b] += sum over points of wx phi_a(x) G(RADIUS (x - y)) psi_b(y) wy."""
     g = np.empty(6)
     inner = np.empty((SHAPES, 6))
     for p in range(len(wx)):
         inner[:] = 0.0
         for q in range(len(wy)):
             stokeslet(
-                shift[0] + RADIUS * (x[p, 0] - y[q, 0]),
-                shift[1] + RADIUS * (x[p, 1] - y[q, 1]),
-                shift[2] + RADIUS * (x[p, 2] - y[q, 2]),
+                RADIUS * (x[p, 0] - y[q, 0]),
+                RADIUS * (x[p, 1] - y[q, 1]),
+                RADIUS * (x[p, 2] - y[q, 2]),
                 g,
             )
             for b in range(SHAPES):
@@ -151,45 +134,11 @@ def _add_matched_points(x, phi, y, psi, weights, block):
 
 
 @njit(cache=True)
-def _centre_and_reach(corners):
-    """Centroid of a projected element on the unit sphere and the largest distance to a corner."""
-    centre = corners[0] + corners[1] + corners[2]
-    centre /= np.sqrt(np.sum(centre**2))
-    reach = 0.0
-    for k in range(3):
-        reach = max(reach, np.sum((corners[k] - centre) ** 2))
-    return centre, np.sqrt(reach)
-
-
-@njit(cache=True)
-def _quarter(barycentric, k, out):
-    """Sub-triangle k of the four that halve the sides; rows are barycentric corners."""
-    if k == 3:
-        for i in range(3):
-            out[i] = 0.5 * (barycentric[(i + 1) % 3] + barycentric[(i + 2) % 3])
-    else:
-        for i in range(3):
-            out[i] = 0.5 * (barycentric[i] + barycentric[k])
-
-
-@njit(cache=True)
-def _projected(corners, barycentric):
-    """Corners on the unit sphere of a sub-triangle given in barycentric coordinates."""
-    out = barycentric @ corners
-    for k in range(3):
-        out[k] /= np.sqrt(np.sum(out[k] ** 2))
-    return out
-
-
-_MOST_HALVINGS = 16
-
-
-@njit(cache=True)
-def _add_separate_pair(shift, corners_x, corners_y, rule, weights, separation, block):
+def _add_separate_pair(corners_x, corners_y, rule, weights, separation, block):
     """Integrate over two elements that do not touch, halving them where they are close."""
-    stack_x = np.empty((8 * _MOST_HALVINGS, 3, 3))
-    stack_y = np.empty((8 * _MOST_HALVINGS, 3, 3))
-    depth = np.zeros(8 * _MOST_HALVINGS, dtype=np.int64)
+    stack_x = np.empty((4 * MOST_HALVINGS, 3, 3))
+    stack_y = np.empty((4 * MOST_HALVINGS, 3, 3))
+    depth = np.zeros(4 * MOST_HALVINGS, dtype=np.int64)
     count = len(weights)
     x, y = np.empty((count, 3)), np.empty((count, 3))
     phi, psi = np.empty((count, SHAPES)), np.empty((count, SHAPES))
@@ -200,29 +149,24 @@ def _add_separate_pair(shift, corners_x, corners_y, rule, weights, separation, b
     while top > 0:
         top -= 1
         bx, by, level = stack_x[top].copy(), stack_y[top].copy(), depth[top]
-        centre_x, reach_x = _centre_and_reach(_projected(corners_x, bx))
-        centre_y, reach_y = _centre_and_reach(_projected(corners_y, by))
-        distance = np.sqrt(np.sum((shift + RADIUS * (centre_x - centre_y)) ** 2)) / RADIUS
-        gap = distance - reach_x - reach_y
-        if gap < separation * 2.0 * max(reach_x, reach_y) and level < _MOST_HALVINGS:
+        centre_x, reach_x = centre_and_reach(corners_x, bx, False)
+        centre_y, reach_y = centre_and_reach(corners_y, by, False)
+        gap = np.sqrt(np.sum((centre_x - centre_y) ** 2)) - reach_x - reach_y
+        if gap < separation * 2.0 * max(reach_x, reach_y) and level < MOST_HALVINGS:
             for k in range(4):
                 if reach_x >= reach_y:
-                    _quarter(bx, k, stack_x[top])
+                    quarter(bx, k, stack_x[top])
                     stack_y[top] = by
                 else:
                     stack_x[top] = bx
-                    _quarter(by, k, stack_y[top])
+                    quarter(by, k, stack_y[top])
                 depth[top] = level + 1
                 top += 1
             continue
         _points_on(corners_x, rule @ bx, x, phi, dx)
         _points_on(corners_y, rule @ by, y, psi, dy)
-        # A sub-triangle covers this share of the flat element's area.
-        share_x = abs(np.linalg.det(bx))
-        share_y = abs(np.linalg.det(by))
-        _add_point_pairs(
-            shift, x, phi, share_x * dx * weights, y, psi, share_y * dy * weights, block
-        )
+        weight_x, weight_y = share_of_area(bx) * dx * weights, share_of_area(by) * dy * weights
+        _add_point_pairs(x, phi, weight_x, y, psi, weight_y, block)
 
 
 @njit(cache=True)
@@ -244,7 +188,6 @@ def _assemble_self(corners, dofs, shared, order_x, order_y, rules, rule, weights
     n = 3 * (dofs.max() + 1)
     matrix = np.zeros((n, n))
     scale = RADIUS**4 / (8.0 * np.pi)
-    here = np.zeros(3)
     largest = max(len(rules[0][2]), len(rules[1][2]), len(rules[2][2]))
     x, y = np.empty((largest, 3)), np.empty((largest, 3))
     phi, psi = np.empty((largest, SHAPES)), np.empty((largest, SHAPES))
@@ -254,7 +197,7 @@ def _assemble_self(corners, dofs, shared, order_x, order_y, rules, rule, weights
             block = np.zeros((SHAPES, SHAPES, 6))
             common = shared[e, f]
             if common == 0:
-                _add_separate_pair(here, corners[e], corners[f], rule, weights, separation, block)
+                _add_separate_pair(corners[e], corners[f], rule, weights, separation, block)
             else:
                 px, py, w = rules[common - 1]
                 count = len(w)
@@ -301,7 +244,7 @@ def self_interaction(
     corners = mesh.vertices[triangles]
     return _assemble_self(
         corners,
-        dof_numbers(mesh),
+        mesh.quadratic_nodes,
         shared,
         order_x,
         order_y,
@@ -316,51 +259,30 @@ def self_interaction(
 def _facing_points(shift, corners, dofs, rule, weights, separation):
     """Quadrature points on one sphere, dense where the surface of another is close.
 
-    shift: centre of the other sphere seen from this one [d_p]. An element is quartered until it is
-    narrower than its distance from the other surface, divided by `separation`.
-    Returns leaf by leaf: points (k, q, 3) [d_p], weighted shape functions (k, q, 6) and the
+    shift: centre of the other sphere seen from this one [d_p]. separation: as in `parts_facing`.
+    Returns part by part: points (k, q, 3) [d_p], weighted shape functions (k, q, 6) and the
     numbers of the six nodes (k, 6).
     """
-    count = len(weights)
-    capacity = 4 * len(corners)
-    leaf = np.empty((capacity, 3, 3))
-    owner = np.empty(capacity, dtype=np.int64)
-    leaves = 0
-    stack = np.empty((4 * _MOST_HALVINGS, 3, 3))
-    depth = np.empty(4 * _MOST_HALVINGS, dtype=np.int64)
-    for e in range(len(corners)):
-        stack[0] = np.eye(3)
-        depth[0] = 0
-        top = 1
-        while top > 0:
-            top -= 1
-            sub, level = stack[top].copy(), depth[top]
-            centre, reach = _centre_and_reach(_projected(corners[e], sub))
-            distance = np.sqrt(np.sum((shift - RADIUS * centre) ** 2)) / RADIUS - 1.0
-            if 2.0 * reach * separation > distance and level < _MOST_HALVINGS:
-                for k in range(4):
-                    _quarter(sub, k, stack[top])
-                    depth[top] = level + 1
-                    top += 1
-                continue
-            if leaves == capacity:
-                capacity *= 2
-                more_leaf, more_owner = np.empty((capacity, 3, 3)), np.empty(capacity, np.int64)
-                more_leaf[:leaves], more_owner[:leaves] = leaf, owner
-                leaf, owner = more_leaf, more_owner
-            leaf[leaves], owner[leaves] = sub, e
-            leaves += 1
-    points = np.empty((leaves, count, 3))
-    shape = np.empty((leaves, count, SHAPES))
-    nodes = np.empty((leaves, SHAPES), dtype=np.int64)
+    count, elements = len(weights), len(corners)
+    parts = np.empty((MOST_PARTS, 3, 3))
+    ends = np.empty(elements, dtype=np.int64)
+    total = 0
+    for e in range(elements):
+        total += parts_facing(shift / RADIUS, 1.0, corners[e], False, separation, parts)
+        ends[e] = total
+    points = np.empty((total, count, 3))
+    shape = np.empty((total, count, SHAPES))
+    nodes = np.empty((total, SHAPES), dtype=np.int64)
     density = np.empty(count)
-    for k in range(leaves):
-        _points_on(corners[owner[k]], rule @ leaf[k], points[k], shape[k], density)
-        # A sub-triangle covers this share of the flat element's area.
-        share = abs(np.linalg.det(leaf[k]))
-        for q in range(count):
-            shape[k, q] *= share * density[q] * weights[q] * RADIUS**2
-        nodes[k] = dofs[owner[k]]
+    for e in range(elements):
+        own = parts_facing(shift / RADIUS, 1.0, corners[e], False, separation, parts)
+        for part in range(own):
+            k = ends[e] - own + part
+            _points_on(corners[e], rule @ parts[part], points[k], shape[k], density)
+            scale = share_of_area(parts[part]) * RADIUS**2
+            for q in range(count):
+                shape[k, q] *= scale * density[q] * weights[q]
+            nodes[k] = dofs[e]
     return RADIUS * points, shape, nodes
 
 
@@ -421,7 +343,7 @@ def cross_interaction(shift, mesh_x: SphereMesh, mesh_y: SphereMesh, regular=4, 
         _facing_points(
             toward,
             mesh.vertices[mesh.triangles],
-            dof_numbers(mesh),
+            mesh.quadratic_nodes,
             barycentric,
             weights,
             separation,
@@ -436,7 +358,7 @@ def nodal_integrals(mesh: SphereMesh, values, rule: int = 8) -> np.ndarray:
     position, shape, weights = element_points(mesh, rule)
     samples = values(position.reshape(-1, 3)).reshape(*weights.shape, -1)
     element = RADIUS**2 * np.einsum("eq,qa,eqk->eak", weights, shape, samples)
-    dofs = dof_numbers(mesh)
+    dofs = mesh.quadratic_nodes
     out = np.zeros((dofs.max() + 1, element.shape[2]))
     np.add.at(out, dofs, element)
     return out
