@@ -26,7 +26,7 @@ SERIES_BELOW = 0.05
 """Where `beta * step` is smaller, the differences of exponentials come from their series."""
 
 
-def drag_coefficients(model, velocity: np.ndarray, neighbours: np.ndarray):
+def drag_coefficients(model, velocity: np.ndarray, neighbours: np.ndarray, first: int = 0):
     """Ask a force model for the drag on every particle.
 
     A particle at rest has no direction of flow and no drag; its beta is that of the flow it meets
@@ -37,6 +37,7 @@ def drag_coefficients(model, velocity: np.ndarray, neighbours: np.ndarray):
     model : has `predict(neighbours)`, (n, 5, 3) in d_p to (n, 3) in Re_p c_D, flow along +y
     velocity : (n, 3) in v_s, box frame
     neighbours : (n, 5, 3) from each particle to its neighbours in d_p, box frame
+    first : number of the first of these particles among all, for the message of an error
 
     Returns
     -------
@@ -55,13 +56,13 @@ def drag_coefficients(model, velocity: np.ndarray, neighbours: np.ndarray):
     if not np.isfinite(force).all():
         row = np.flatnonzero(~np.isfinite(force).all(axis=1))[0]
         raise FloatingPointError(
-            f"the force model returned {force[row]} for particle {row}, which has velocity "
+            f"the force model returned {force[row]} for particle {first + row}, which has velocity "
             f"{velocity[row]} and neighbours at {neighbours[row].tolist()}"
         )
     return force[:, 1] / STOKES_DRAG, _side_force(rotation, force, velocity)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _rotate(rotation, neighbours):
     """R r for each neighbour of each particle."""
     rotated = np.empty_like(neighbours)
@@ -75,7 +76,7 @@ def _rotate(rotation, neighbours):
     return rotated
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _side_force(rotation, force, velocity):
     """|v| R^T (F'_x, 0, F'_z) / 24."""
     side = np.empty_like(velocity)
@@ -89,7 +90,7 @@ def _side_force(rotation, force, velocity):
     return side
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def advance(position, velocity, beta, side, step, stokes_number):
     """Move all particles through one step in which beta and the side force do not change.
 

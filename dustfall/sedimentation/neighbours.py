@@ -1,23 +1,29 @@
-"""The five nearest neighbours of every particle in a periodic cube."""
+"""The five nearest neighbours of every particle in a periodic cube.
+
+What the search returns hangs on the positions alone: distances are those between nearest images,
+computed in one way everywhere, and where two are equal the particle with the lower row comes first.
+"""
 
 import numpy as np
 from numba import njit
 
 from dustfall.forces.frames import NEIGHBOURS
+from dustfall.sedimentation.blocks import Blocks
 
-POINTS_PER_CELL = 2
-"""Measured optimum: fewer means more cells to visit, more means more distances to compare."""
+FIRST_REACH = 1.5
+"""Radius of a search that knows nothing, in mean spacings: 14 particles are expected within."""
 
-SAFETY = 1 - 1e-9
-"""Keeps rounding of cell faces from declaring a search complete that is not."""
+GROWTH = 1.5
+"""By what a search is widened that met fewer than five particles."""
+
+_ROUNDING = 1e-9  # of a cell: keeps rounding of cell faces from hiding a particle
 
 
 def nearest_neighbours(position: np.ndarray, side: float) -> tuple[np.ndarray, np.ndarray]:
     """Find the five nearest neighbours of every particle, exactly, in a periodic cube.
 
     Every other particle counts once, at its nearest image. Particles are sorted into cells; a
-    search covers the 27 cells around a particle and widens until no uncovered point can be nearer
-    than the fifth neighbour found.
+    search covers the cells within a radius and widens until it holds five.
 
     Parameters
     ----------
@@ -33,6 +39,18 @@ def nearest_neighbours(position: np.ndarray, side: float) -> tuple[np.ndarray, n
     ------
     ValueError : fewer than six particles, wrong shape, positions not finite, `side` not positive.
     """
+    position = check_positions(position, side)
+    n = len(position)
+    wrapped = wrap(position, side)
+    cells = sort_by_cell(wrapped, side)
+    index = np.empty((n, NEIGHBOURS), np.int32)
+    with Blocks(n) as blocks:
+        blocks.run(lambda first, last: _search(first, last, wrapped, side, cells, index))
+    return separations(wrapped, index, side, 0, n), index
+
+
+def check_positions(position: np.ndarray, side: float) -> np.ndarray:
+    """Return `position` as contiguous float64 (n, 3), or raise ValueError by name."""
     position = np.ascontiguousarray(position, dtype=np.float64)
     if position.ndim != 2 or position.shape[1] != 3:
         raise ValueError(f"positions have shape {position.shape}: (n, 3) is needed")
@@ -46,150 +64,180 @@ def nearest_neighbours(position: np.ndarray, side: float) -> tuple[np.ndarray, n
     if not np.isfinite(position).all():
         row = np.flatnonzero(~np.isfinite(position).all(axis=1))[0]
         raise ValueError(f"position of particle {row} is {position[row]}: it has to be finite")
-    cells = max(1, int((len(position) / POINTS_PER_CELL) ** (1 / 3)))
-    return _nearest(position, float(side), cells)
+    return position
 
 
-@njit(cache=True)
-def _sort_by_cell(position, side, cells):
-    """Counting sort: positions wrapped and ordered by cell, their rows, the cells' first places."""
-    n = len(position)
-    wrapped = np.empty((n, 3))
-    cell = np.empty(n, np.int64)
-    first = np.zeros(cells**3 + 1, np.int64)
+@njit(cache=True, nogil=True)
+def wrap(position, side):
+    """Positions (n, 3) folded into the cube, 0 <= x < side."""
+    wrapped = np.empty_like(position)
+    for i in range(len(position)):
+        for axis in range(3):
+            x = position[i, axis] - side * np.floor(position[i, axis] / side)
+            # A tiny negative coordinate wraps onto the far face by rounding.
+            wrapped[i, axis] = x if x < side else 0.0
+    return wrapped
+
+
+@njit(cache=True, nogil=True)
+def _nearest_image(difference, side):
+    """A difference of two wrapped coordinates, taken to the nearest image."""
+    if difference > 0.5 * side:
+        return difference - side
+    if difference < -0.5 * side:
+        return difference + side
+    return difference
+
+
+@njit(cache=True, nogil=True)
+def distance2(wrapped, i, j, side):
+    """Square of the distance between particles `i` and `j`: the one that all searches compare."""
+    x = _nearest_image(wrapped[j, 0] - wrapped[i, 0], side)
+    y = _nearest_image(wrapped[j, 1] - wrapped[i, 1], side)
+    z = _nearest_image(wrapped[j, 2] - wrapped[i, 2], side)
+    return x * x + y * y + z * z
+
+
+@njit(cache=True, nogil=True)
+def separations(wrapped, index, side, first, last):
+    """Vectors (m, 5, 3) from the particles `first` to `last - 1` to their neighbours."""
+    vectors = np.empty((last - first, index.shape[1], 3))
+    for i in range(first, last):
+        for slot in range(index.shape[1]):
+            j = index[i, slot]
+            for axis in range(3):
+                difference = wrapped[j, axis] - wrapped[i, axis]
+                vectors[i - first, slot, axis] = _nearest_image(difference, side)
+    return vectors
+
+
+@njit(cache=True, nogil=True)
+def sort_by_cell(wrapped, side):
+    """Sort particles into cubic cells of one particle on average.
+
+    Returns the number of cells along a side, the rows in the order of their cells, their positions
+    in that order, and each cell's first place in it.
+    """
+    n = len(wrapped)
+    cells = max(1, int(n ** (1 / 3)))
+    scale = cells / side
+    cell = np.empty(n, np.int32)
+    first = np.zeros(cells**3 + 1, np.int32)
     for i in range(n):
         number = 0
         for axis in range(3):
-            x = position[i, axis] - side * np.floor(position[i, axis] / side)
-            if x >= side:  # a tiny negative coordinate wraps onto the far face by rounding
-                x = 0.0
-            wrapped[i, axis] = x
-            number = number * cells + min(int(x / side * cells), cells - 1)
+            number = number * cells + min(int(wrapped[i, axis] * scale), cells - 1)
         cell[i] = number
         first[number + 1] += 1
     for number in range(cells**3):
         first[number + 1] += first[number]
     place = first[:-1].copy()
-    point = np.empty((3, n))
     row = np.empty(n, np.int32)
+    point = np.empty((n, 3))
     for i in range(n):
         k = place[cell[i]]
         place[cell[i]] += 1
         row[k] = i
-        point[:, k] = wrapped[i]
-    return point, row, first
+        point[k] = wrapped[i]
+    return cells, row, point, first
 
 
-@njit(cache=True)
-def _gather(low, high, side, cells, point, first, candidate, place):
-    """Copy the points in the cells `low` to `high`, each shifted to the image beside them."""
+@njit(cache=True, nogil=True)
+def collect(i, reach, wrapped, side, cells, met, square):
+    """Find all particles within `reach` of particle `i`, itself included, in no special order.
+
+    Writes their rows to `met` and the squares of their distances to `square`; returns how many.
+    """
+    number, row, point, first = cells
+    scale = number / side
+    low, high = np.empty(3, np.int64), np.empty(3, np.int64)
+    for axis in range(3):
+        low[axis] = np.floor((wrapped[i, axis] - reach) * scale - _ROUNDING)
+        high[axis] = np.floor((wrapped[i, axis] + reach) * scale + _ROUNDING)
+        if high[axis] - low[axis] >= number:  # every cell once, none as two images
+            low[axis], high[axis] = 0, number - 1
+    # Cells that follow each other along z do so in memory: one run, or two where it meets a face.
+    runs = 2 if low[2] < 0 or high[2] >= number else 1
+    x, y, z = wrapped[i]
+    limit = reach * reach
     count = 0
     for cx in range(low[0], high[0] + 1):
-        image_x = -1 if cx < 0 else (1 if cx >= cells else 0)
         for cy in range(low[1], high[1] + 1):
-            image_y = -1 if cy < 0 else (1 if cy >= cells else 0)
-            column = ((cx - image_x * cells) * cells + cy - image_y * cells) * cells
-            # Cells that follow each other along z do so in memory too, within one image.
-            for image_z in range(-1, 2):
-                bottom = max(low[2] - image_z * cells, 0)
-                top = min(high[2] - image_z * cells, cells - 1)
-                if bottom > top:
-                    continue
+            column = ((cx % number) * number + cy % number) * number
+            for run in range(runs):
+                if runs == 1:
+                    bottom, top = low[2], high[2]
+                elif run == 0:
+                    bottom, top = low[2] % number, number - 1
+                else:
+                    bottom, top = 0, high[2] % number
                 for k in range(first[column + bottom], first[column + top + 1]):
-                    candidate[0, count] = point[0, k] + image_x * side
-                    candidate[1, count] = point[1, k] + image_y * side
-                    candidate[2, count] = point[2, k] + image_z * side
-                    place[count] = k
-                    count += 1
+                    dx = _nearest_image(point[k, 0] - x, side)
+                    dy = _nearest_image(point[k, 1] - y, side)
+                    dz = _nearest_image(point[k, 2] - z, side)
+                    met[count] = row[k]
+                    square[count] = dx * dx + dy * dy + dz * dz
+                    count += square[count] <= limit
     return count
 
 
-@njit(cache=True)
-def _gather_all(k, side, point, candidate, place):
-    """Copy all points, each shifted to its image nearest to point `k`."""
-    n = point.shape[1]
-    for j in range(n):
-        place[j] = j
-        for axis in range(3):
-            x = point[axis, j]
-            candidate[axis, j] = x - side * np.rint((x - point[axis, k]) / side)
-    return n
+@njit(cache=True, nogil=True)
+def insert(j, square, nearest, chosen, count):
+    """Put a particle into its place in a list ordered by distance; return the list's length.
+
+    `nearest` and `chosen` hold squares of distances and rows; a full list drops its last.
+    """
+    slot = count
+    if count == len(nearest):
+        slot = count - 1
+        if not _before(square, j, nearest[slot], chosen[slot]):
+            return count
+    while slot > 0 and _before(square, j, nearest[slot - 1], chosen[slot - 1]):
+        nearest[slot] = nearest[slot - 1]
+        chosen[slot] = chosen[slot - 1]
+        slot -= 1
+    nearest[slot] = square
+    chosen[slot] = j
+    return min(count + 1, len(nearest))
 
 
-@njit(cache=True)
-def _select(k, count, point, candidate, place, distance2, nearest, chosen):
-    """Choose the five candidates nearest to point `k`; return the fifth distance squared."""
-    x, y, z = point[0, k], point[1, k], point[2, k]
-    for j in range(count):
-        distance2[j] = (
-            (candidate[0, j] - x) ** 2 + (candidate[1, j] - y) ** 2 + (candidate[2, j] - z) ** 2
-        )
-    nearest[:] = np.inf
-    fifth = np.inf
-    for j in range(count):
-        if distance2[j] < fifth and place[j] != k:
-            slot = NEIGHBOURS - 1
-            while slot > 0 and nearest[slot - 1] > distance2[j]:
-                nearest[slot] = nearest[slot - 1]
-                chosen[slot] = chosen[slot - 1]
-                slot -= 1
-            nearest[slot] = distance2[j]
-            chosen[slot] = j
-            fifth = nearest[NEIGHBOURS - 1]
-    return fifth
+@njit(cache=True, nogil=True)
+def _before(square, j, other_square, other):
+    return square < other_square or (square == other_square and j < other)
 
 
-@njit(cache=True)
-def _nearest(position, side, cells):
-    n = len(position)
-    point, row, first = _sort_by_cell(position, side, cells)
-    width = side / cells
-    vectors = np.empty((n, NEIGHBOURS, 3))
-    indices = np.empty((n, NEIGHBOURS), np.int32)
-    candidate = np.empty((3, n))
-    place = np.empty(n, np.int64)
-    distance2 = np.empty(n)
+@njit(cache=True, nogil=True)
+def nearest_within(i, reach, wrapped, side, cells, met, square, nearest, chosen):
+    """List the particles nearest to `i`, at least five, nearest first.
+
+    The list takes those within `reach`, or within a larger radius where there are fewer than five,
+    as far as there is room in `nearest` (squares of distances) and `chosen` (rows). Returns how
+    many are listed, and a distance that no particle left out is nearer than.
+    """
+    while True:
+        found = collect(i, reach, wrapped, side, cells, met, square)
+        if found > NEIGHBOURS:
+            break
+        reach *= GROWTH
+    count = 0
+    for k in range(found):
+        if met[k] != i:
+            count = insert(met[k], square[k], nearest, chosen, count)
+    if count == len(wrapped) - 1:
+        bound = np.inf
+    elif count == found - 1:
+        bound = reach
+    else:
+        bound = np.sqrt(nearest[count - 1])
+    return count, bound
+
+
+@njit(cache=True, nogil=True)
+def _search(first, last, wrapped, side, cells, index):
+    """The five nearest of the particles at places `first` to `last - 1` of the cells' order."""
+    n = len(wrapped)
+    met, square = np.empty(n + 1, np.int32), np.empty(n + 1)
     nearest = np.empty(NEIGHBOURS)
-    chosen = np.empty(NEIGHBOURS, np.int64)
-    cell = np.empty(3, np.int64)
-    low = np.empty(3, np.int64)
-    high = np.empty(3, np.int64)
-    for number in range(cells**3):
-        cell[0], cell[1], cell[2] = number // cells**2, number // cells % cells, number % cells
-        beside = 0  # how many candidates are those of the 27 cells around; 0 when not gathered
-        for k in range(first[number], first[number + 1]):
-            fifth = np.inf
-            complete = False
-            if cells >= 3:
-                if beside == 0:
-                    low[:] = cell - 1
-                    high[:] = cell + 1
-                    beside = _gather(low, high, side, cells, point, first, candidate, place)
-                fifth = _select(k, beside, point, candidate, place, distance2, nearest, chosen)
-                # No point outside the 27 cells is nearer than one cell plus this margin.
-                margin = width
-                for axis in range(3):
-                    inside = point[axis, k] - cell[axis] * width
-                    margin = min(margin, inside, width - inside)
-                covered = (width + margin) * SAFETY
-                complete = fifth <= covered * covered
-            if not complete:
-                beside = 0
-                # The fifth candidate so far bounds where the true five are.
-                reach = np.sqrt(fifth) / SAFETY if np.isfinite(fifth) else side
-                widest = 0
-                for axis in range(3):
-                    low[axis] = np.floor((point[axis, k] - reach) / width)
-                    high[axis] = np.floor((point[axis, k] + reach) / width)
-                    widest = max(widest, high[axis] - low[axis] + 1)
-                if widest <= cells:
-                    count = _gather(low, high, side, cells, point, first, candidate, place)
-                else:  # a cell would be met twice, as two images
-                    count = _gather_all(k, side, point, candidate, place)
-                _select(k, count, point, candidate, place, distance2, nearest, chosen)
-            for slot in range(NEIGHBOURS):
-                j = chosen[slot]
-                indices[row[k], slot] = row[place[j]]
-                for axis in range(3):
-                    vectors[row[k], slot, axis] = candidate[axis, j] - point[axis, k]
-    return vectors, indices
+    for i in cells[1][first:last]:
+        reach = FIRST_REACH * side / n ** (1 / 3)
+        nearest_within(i, reach, wrapped, side, cells, met, square, nearest, index[i])

@@ -11,14 +11,15 @@ from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
-from numba import njit
 
 from dustfall import __version__
 from dustfall.sedimentation import checkpoint as checkpoints
+from dustfall.sedimentation.blocks import Blocks
 from dustfall.sedimentation.dynamics import advance, drag_coefficients
-from dustfall.sedimentation.neighbours import nearest_neighbours
+from dustfall.sedimentation.neighbour_list import NeighbourList
 from dustfall.sedimentation.properties import Properties
 from dustfall.sedimentation.start import cube_side, random_positions
+from dustfall.sedimentation.statistics import step_statistics
 from dustfall.sedimentation.trajectory import (
     SERIES,
     TRACKED,
@@ -57,6 +58,7 @@ def settle(
     precision: str = "float32",
     checkpoint: str | Path | None = None,
     checkpoint_interval: float = 60.0,
+    threads: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> dict:
     """Let particles settle in a fluid at rest and write their trajectory and series.
@@ -67,7 +69,8 @@ def settle(
     second order as long as the neighbours stay the same, with one call of the model a step.
 
     Where spheres overlap in the course of a run they move on as the model says (a neighbour closer
-    than contact is held at contact by the force models); `overlaps` counts such pairs at each step.
+    than contact is held at contact by the force models). At each step `overlaps` counts such
+    pairs, and `below_contact` the neighbours that the model was shown closer than contact.
 
     Parameters
     ----------
@@ -84,6 +87,7 @@ def settle(
         when it is called again, and ends with the same bits; at the end the folder is removed.
         SIGTERM saves the state and stops.
     checkpoint_interval : wall time between checkpoints, s
+    threads : that share the work of a step; their number changes no bit of the results
     progress : called with the number of steps done and of all steps
 
     Returns
@@ -138,33 +142,32 @@ def settle(
         "settling_velocity": properties.settling_velocity,
         "units": UNITS,
     }
-    with _working_folder(checkpoint, trajectory) as folder, _terminated() as terminated:
+    with (
+        _working_folder(checkpoint, trajectory) as folder,
+        _terminated() as terminated,
+        Blocks(particles, threads) as blocks,
+    ):
         state, frames, rows = _resume(folder, settings, frame_type(particles, precision))
         if state:
             done, position, velocity = int(state["done"]), state["position"], state["velocity"]
             beta_before, side_force_before = state["beta"], state["side_force"]
-            five_before = state["five"]
+            index_before = state["index"]
         else:
             done, position = 0, positions
             velocity = np.zeros((particles, 3))
             velocity[:, 2] = START_VELOCITY[start]
         first, began = done, time.monotonic()
         saved = began
+        neighbours = NeighbourList(particles, side, blocks)
         while True:
-            neighbours, index = nearest_neighbours(position, side)
-            beta, side_force = drag_coefficients(model, velocity, neighbours)
-            five = np.sort(index, axis=1)
+            index = neighbours.update(position)
+            beta, side_force = _drag(model, velocity, neighbours, blocks)
             if done == 0:
-                beta_before, side_force_before, five_before = beta, side_force, five
+                beta_before, side_force_before, index_before = beta, side_force, index
 
             rows.append(
                 time=done * step,
-                settling_velocity_mean=-velocity[:, 2].mean(),
-                settling_velocity_variance=velocity[:, 2].var(),
-                inverse_beta_mean=(1 / beta).mean(),
-                beta_mean=beta.mean(),
-                new_neighbours=(five != five_before).any(axis=1).mean(),
-                overlaps=_overlaps(neighbours, index),
+                **step_statistics(velocity, beta, side_force, neighbours, index_before),
                 tracked_position=position[tracked],
                 tracked_velocity=velocity[tracked],
                 tracked_force=side_force[tracked] - beta[tracked, None] * velocity[tracked],
@@ -189,7 +192,7 @@ def settle(
                 step,
                 stokes_number,
             )
-            beta_before, side_force_before, five_before = beta, side_force, five
+            beta_before, side_force_before, index_before = beta, side_force, index
             done += 1
 
             if checkpoint is not None and (
@@ -203,7 +206,7 @@ def settle(
                     "velocity": velocity,
                     "beta": beta_before,
                     "side_force": side_force_before,
-                    "five": five_before,
+                    "index": index_before,
                     "frames": frames.count,
                     "rows": rows.count,
                 }
@@ -224,6 +227,20 @@ def settle(
         "seconds": seconds,
         "steps_per_second": (done - first) / seconds,
     }
+
+
+def _drag(model, velocity: np.ndarray, neighbours: NeighbourList, blocks: Blocks):
+    """Drag coefficient (n,) and side force (n, 3) of all particles, block by block."""
+    beta, side_force = np.empty(len(velocity)), np.empty_like(velocity)
+
+    def work(first, last):
+        rows = slice(first, last)
+        beta[rows], side_force[rows] = drag_coefficients(
+            model, velocity[rows], neighbours.vectors(first, last), first
+        )
+
+    blocks.run(work)
+    return beta, side_force
 
 
 def _multiple(name: str, value: float, step: float) -> int:
@@ -247,19 +264,6 @@ def _model_digest(model) -> str:
     direction /= np.linalg.norm(direction, axis=2, keepdims=True)
     distance = 10 ** rng.uniform(0.1, 2.5, size=(64, 5, 1))
     return _digest(model.predict(distance * direction))
-
-
-@njit(cache=True)
-def _overlaps(neighbours, index):
-    """Pairs closer than a diameter of which one is among the other's five nearest."""
-    count = 0
-    for i in range(len(index)):
-        for slot in range(index.shape[1]):
-            x, y, z = neighbours[i, slot]
-            j = index[i, slot]
-            if x * x + y * y + z * z < 1.0 and (i < j or not (index[j] == i).any()):
-                count += 1
-    return count
 
 
 def _resume(folder: Path, settings: dict, frame: np.dtype):

@@ -1,0 +1,189 @@
+"""Neighbours of particles that move: what one step's search found, used while it provably holds."""
+
+import numpy as np
+from numba import njit
+
+from dustfall.forces.frames import NEIGHBOURS
+from dustfall.sedimentation.blocks import Blocks
+from dustfall.sedimentation.neighbours import (
+    FIRST_REACH,
+    check_positions,
+    distance2,
+    insert,
+    nearest_within,
+    separations,
+    sort_by_cell,
+    wrap,
+)
+
+CANDIDATES = 24
+"""Most particles that a list holds."""
+
+SKIN = 0.45
+"""How far beyond the fifth neighbour a list reaches, in mean spacings."""
+
+FARTHEST_REACH = 4.0
+"""Largest radius that a list asks for at first, in mean spacings."""
+
+REORDERED_EVERY = 128
+"""Updates after which the lists are put in order again, so that those of neighbours lie together
+in memory: with the lists in no order an update takes twice as long."""
+
+_ROUNDING = 1e-12  # of the coordinates: far above the rounding of a step's displacements
+_DOWN = 1 - 1e-6  # keeps single precision from rounding a distance up
+
+
+class NeighbourList:
+    """The five nearest neighbours of each particle, step after step: exactly `nearest_neighbours`.
+
+    Each particle has a list of candidates, sorted by distance, and a distance that none of the
+    others is nearer than. Since the list was made, the particle and any other one have come closer
+    by no more than `reach`, the way of the particle plus that of the fastest one at each step,
+    measured against the mean drift. So candidates are looked at in their order until the next one's
+    old distance, less `reach`, exceeds the fifth new distance. A particle whose list ends before
+    is searched anew. Nothing of this changes what is returned.
+
+    Parameters
+    ----------
+    particles : at least six
+    side : of the cube
+    blocks : of the particles
+
+    Attributes
+    ----------
+    index : (n, 5) int32, rows of the neighbours, nearest first
+    searched : particles that the last update searched anew
+    """
+
+    def __init__(self, particles: int, side: float, blocks: Blocks):
+        self.side = float(side)
+        self.index = np.empty((particles, NEIGHBOURS), np.int32)
+        self.searched = 0
+        self._blocks = blocks
+        self._updates = 0
+        self._wrapped = self._before = self._order = None
+        self._listed = np.empty((particles, CANDIDATES), np.int32)
+        self._distance = np.empty((particles, CANDIDATES), np.float32)
+        self._length = np.zeros(particles, np.int32)
+        self._bound = np.zeros(particles)
+        self._way = np.zeros(particles)
+        self._way_at_search = np.zeros(particles)
+
+    def update(self, position: np.ndarray) -> np.ndarray:
+        """Find the neighbours at `position` (n, 3), wrapped or not; return `index`, a new array.
+
+        Raises ValueError for positions that `nearest_neighbours` refuses.
+        """
+        position = check_positions(position, self.side)
+        self._wrapped = wrap(position, self.side)
+        if self._before is not None:
+            _add_way(self._way, position, self._before, self.side)
+        self._before = position.copy()
+        cells = sort_by_cell(self._wrapped, self.side)
+        if self._updates % REORDERED_EVERY == 0:
+            self._order = cells[1]
+            self._length[:] = 0
+        self._updates += 1
+        self.index = np.empty_like(self.index)
+        searched = np.zeros(len(position), np.bool_)
+        self._blocks.run(
+            lambda first, last: _renew(
+                first,
+                last,
+                self._wrapped,
+                self.side,
+                cells,
+                self._order,
+                self._way,
+                self._way_at_search,
+                self._listed,
+                self._distance,
+                self._length,
+                self._bound,
+                self.index,
+                searched,
+            )
+        )
+        self.searched = int(searched.sum())
+        return self.index
+
+    def vectors(self, first: int, last: int) -> np.ndarray:
+        """Vectors (m, 5, 3) from the particles `first` to `last - 1` to their neighbours."""
+        return separations(self._wrapped, self.index, self.side, first, last)
+
+
+@njit(cache=True, nogil=True)
+def _add_way(way, position, before, side):
+    """Add a step's displacements, less their mean, to the `reach` of every list."""
+    n = len(position)
+    drift = np.zeros(3)
+    for i in range(n):
+        for axis in range(3):
+            drift[axis] += (position[i, axis] - before[i, axis]) / n
+    longest = largest = 0.0
+    for i in range(n):
+        square = 0.0
+        for axis in range(3):
+            square += (position[i, axis] - before[i, axis] - drift[axis]) ** 2
+            largest = max(largest, abs(position[i, axis]))
+        way[i] += np.sqrt(square)
+        longest = max(longest, square)
+    way += np.sqrt(longest) + _ROUNDING * (side + largest)
+
+
+@njit(cache=True, nogil=True)
+def _renew(
+    first,
+    last,
+    wrapped,
+    side,
+    cells,
+    order,
+    way,
+    way_at_search,
+    listed,
+    distance,
+    length,
+    bound,
+    index,
+    searched,
+):
+    """The five nearest of the particles whose lists are the rows `first` to `last - 1`."""
+    n = len(wrapped)
+    spacing = side / n ** (1 / 3)
+    met, square = np.empty(n + 1, np.int32), np.empty(n + 1)
+    nearest = np.empty(CANDIDATES)
+    five = nearest[:NEIGHBOURS]
+    for k in range(first, last):
+        i = order[k]
+        chosen = index[i]
+        reach = way[i] - way_at_search[k]
+        fifth = np.inf
+        count, holds = 0, False
+        for entry in range(length[k]):
+            if _beyond(distance[k, entry] - reach, fifth):
+                holds = True
+                break
+            j = listed[k, entry]
+            count = insert(j, distance2(wrapped, i, j, side), five, chosen, count)
+            if count == NEIGHBOURS:
+                fifth = five[NEIGHBOURS - 1]
+        if holds or _beyond(bound[k] - reach, fifth):
+            continue
+        searched[i] = True
+        reach = FIRST_REACH * spacing
+        if fifth < np.inf:  # an upper bound of the fifth distance
+            reach = min(np.sqrt(fifth) + SKIN * spacing, FARTHEST_REACH * spacing)
+        length[k], bound[k] = nearest_within(
+            i, reach, wrapped, side, cells, met, square, nearest, listed[k]
+        )
+        way_at_search[k] = way[i]
+        for entry in range(length[k]):
+            distance[k, entry] = np.sqrt(nearest[entry]) * _DOWN
+        chosen[:] = listed[k, :NEIGHBOURS]
+
+
+@njit(cache=True, nogil=True)
+def _beyond(distance, square):
+    """Whether a lower bound of a distance is above the root of `square`."""
+    return distance > 0.0 and distance * distance > square

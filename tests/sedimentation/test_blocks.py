@@ -1,0 +1,46 @@
+import numpy as np
+import pytest
+import xarray as xr
+
+from dustfall.forces.models import load_model
+from dustfall.sedimentation import Properties, settle
+from dustfall.sedimentation.blocks import BLOCK, Blocks
+
+
+@pytest.mark.parametrize("particles", [1, BLOCK - 1, BLOCK, BLOCK + 1, 5 * BLOCK + 7])
+@pytest.mark.parametrize("threads", [1, 3])
+def test_blocks_cover_every_row_once(particles, threads):
+    met = np.zeros(particles, int)
+
+    def work(first, last):
+        met[first:last] += 1
+
+    with Blocks(particles, threads) as blocks:
+        blocks.run(work)
+    assert (met == 1).all()
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_an_error_in_a_block_is_not_lost(threads):
+    def work(first, last):
+        raise FloatingPointError(f"rows {first} to {last - 1}")
+
+    with Blocks(10, threads) as blocks, pytest.raises(FloatingPointError, match="rows 0 to 9"):
+        blocks.run(work)
+
+
+def test_bits_hang_not_on_the_number_of_threads(tmp_path):
+    files = []
+    for threads in (1, 2):
+        files.append([tmp_path / f"{threads}.nc", tmp_path / f"{threads}.series.nc"])
+        settle(
+            load_model(), Properties(), 2500, 1e-3, 0.1, 1.0, 0.5, 1, *files[-1],
+            precision="float64", threads=threads,
+        )  # fmt: skip
+    for one, two in zip(*files, strict=True):
+        assert xr.load_dataset(one).identical(xr.load_dataset(two))
+
+
+def test_no_threads_are_refused():
+    with pytest.raises(ValueError, match="threads is 0"):
+        Blocks(10, 0)
