@@ -1,6 +1,6 @@
 # The campaign: random scenes, boundary-element forces, force models, sedimentation, figures.
 # `snakemake -n` shows the plan, `snakemake all` runs it, `snakemake figures` makes the figures,
-# `snakemake benchmarks` times the Stokes solver.
+# `snakemake benchmarks` times the Stokes solver, `snakemake studies` compares time steps.
 import json
 import os
 import sys
@@ -38,6 +38,7 @@ include: "workflow/rules/idnn.smk"
 include: "workflow/rules/sedimentation.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/benchmarks.smk"
+include: "workflow/rules/studies.smk"
 
 
 rule all:
@@ -60,6 +61,12 @@ rule benchmarks:
     """Run time of the solver against its error; no part of `all`, as timings differ each time."""
     input:
         expand("results/benchmarks/{law}.csv", law=["uniform", "ball"]),
+
+
+rule studies:
+    """What numerical settings do to the results; no part of `all`."""
+    input:
+        "results/studies/step_size.csv",
 
 
 rule configuration:

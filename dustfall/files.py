@@ -28,3 +28,11 @@ def atomic(path: str | os.PathLike) -> Iterator[Path]:
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def remove_leftovers(path: str | os.PathLike) -> None:
+    """Remove temporary files of `path` that a killed process left; none may be at work on it."""
+    path = Path(path)
+    # Eight characters are what mkstemp draws.
+    for temporary in path.parent.glob(f".{path.stem}.{8 * '?'}{path.suffix}"):
+        temporary.unlink()

@@ -189,20 +189,32 @@ def _check_physics(config: dict) -> None:
         f"sedimentation.properties.particle_density is {particle:g} kg/m³, but must be above "
         f"sedimentation.properties.fluid_density, which is {fluid:g} kg/m³.",
     )
+    studies = config["studies"]
+    for step in studies["steps"]:
+        _require_multiple("studies.duration", studies["duration"], "one of studies.steps", step)
+    latest = studies["duration"] - STEADY_STEPS * max(studies["steps"])
+    _require(
+        studies["statistics_from"] <= latest,
+        f"studies.statistics_from is {studies['statistics_from']:g} response times, but must be at "
+        f"most {latest:g}, so that {STEADY_STEPS} of the largest of studies.steps follow.",
+    )
     step, duration = settle["step"], settle["duration"]
     for key in ("duration", "save_every"):
-        steps = round(settle[key] / step)
-        _require(
-            steps >= 1 and abs(settle[key] - steps * step) <= 1e-9 * settle[key],
-            f"sedimentation.{key} is {settle[key]:g} response times, but must be a multiple of "
-            f"sedimentation.step, which is {step:g}.",
-        )
+        _require_multiple(f"sedimentation.{key}", settle[key], "sedimentation.step", step)
     latest = duration - max(settle["save_every"], STEADY_STEPS * step)
     _require(
         settle["statistics_from"] <= latest,
         f"sedimentation.statistics_from is {settle['statistics_from']:g} response times, but must "
         f"be at most {latest:g}, so that {STEADY_STEPS} steps and a frame follow within "
         f"sedimentation.duration, which is {duration:g}.",
+    )
+
+
+def _require_multiple(key: str, value: float, of: str, step: float) -> None:
+    steps = round(value / step)
+    _require(
+        steps >= 1 and abs(value - steps * step) <= 1e-9 * value,
+        f"{key} is {value:g} response times, but must be a multiple of {of}, which is {step:g}.",
     )
 
 

@@ -12,14 +12,19 @@ class Case(NamedTuple):
     particles: int
     volume_fraction: float
     galileo_multiple: float
+    seed: int = 1
 
     @property
     def name(self) -> str:
-        """Name that the files of the case have, like n1000_phi1e-03_ga1."""
+        """Name that the files of the case have, like n1000_phi1e-03_ga1 or ..._ga1_seed2.
+
+        The first seed is not named: asking for more of them leaves the runs at hand as they are.
+        """
         # All digits that tell phi from another number, and no more.
         mantissa, exponent = f"{Decimal(repr(self.volume_fraction)):e}".split("e")
         phi = f"{mantissa}e{int(exponent):+03d}"
-        return f"n{self.particles}_phi{phi}_ga{self.galileo_multiple:.15g}"
+        seed = f"_seed{self.seed}" if self.seed > 1 else ""
+        return f"n{self.particles}_phi{phi}_ga{self.galileo_multiple:.15g}{seed}"
 
 
 def shards(config: dict) -> list[str]:
@@ -69,7 +74,16 @@ def cases(config: dict) -> dict[str, Case]:
             for multiple in galileo["multiples"]
         ),
     ]
-    return {case.name: case for case in found}
+    seeds = range(1, settle["seeds"] + 1)
+    return {
+        case.name: case for seed in seeds for case in (one._replace(seed=seed) for one in found)
+    }
+
+
+def start_file(config: dict, case: str) -> list[str]:
+    """File that a case starts from, if any; {case} in its name stands for the name of the case."""
+    pattern = config["sedimentation"]["start_file"]
+    return [pattern.replace("{case}", case)] if pattern else []
 
 
 def case_seed(config: dict, case: str) -> int:

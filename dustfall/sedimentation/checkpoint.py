@@ -7,7 +7,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from dustfall.files import atomic
+from dustfall.files import atomic, remove_leftovers
 
 CURRENT = "state.npz"
 PREVIOUS = "state.previous.npz"
@@ -59,6 +59,6 @@ def load(folder: Path, settings: dict) -> list[dict]:
 
 def clear(folder: Path) -> None:
     """Remove the states, also one that was being written when a run was killed."""
-    for pattern in (CURRENT, PREVIOUS, f".{Path(CURRENT).stem}.*"):
-        for path in folder.glob(pattern):
-            path.unlink()
+    for name in (CURRENT, PREVIOUS):
+        (folder / name).unlink(missing_ok=True)
+    remove_leftovers(folder / CURRENT)

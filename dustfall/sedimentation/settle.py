@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from dustfall import __version__
+from dustfall.files import remove_leftovers
 from dustfall.sedimentation import checkpoint as checkpoints
 from dustfall.sedimentation.blocks import Blocks
 from dustfall.sedimentation.dynamics import advance, drag_coefficients
@@ -55,6 +56,7 @@ def settle(
     series: str | Path,
     start: str = "rest",
     positions: np.ndarray | None = None,
+    velocities: np.ndarray | None = None,
     precision: str = "float32",
     checkpoint: str | Path | None = None,
     checkpoint_interval: float = 60.0,
@@ -80,8 +82,9 @@ def settle(
     step, duration, save_interval : in tau; the latter two are multiples of `step`
     seed : of the start positions and of the choice of the tracked particles
     trajectory, series : NetCDF files to write, see `write_trajectory` and `write_series`
-    start : "rest", or "stokes" for v_s downwards
+    start : "rest", or "stokes" for v_s downwards; does not matter where `velocities` are given
     positions : (n, 3) at the start in d_p; by default random without overlap
+    velocities : (n, 3) at the start in v_s; by default as `start` says
     precision : of the coordinates in the trajectory, "float32" or "float64"
     checkpoint : folder for the state of an unfinished run. A run that was killed goes on from there
         when it is called again, and ends with the same bits; at the end the folder is removed.
@@ -111,9 +114,14 @@ def settle(
     if positions is None:
         rng = np.random.default_rng([seed, POSITIONS])
         positions = random_positions(rng, particles, volume_fraction)
-    positions = np.array(positions, dtype=np.float64)
-    if positions.shape != (particles, 3):
-        raise ValueError(f"positions have shape {positions.shape}: ({particles}, 3) is needed")
+    if velocities is None:
+        velocities = np.tile([0.0, 0.0, START_VELOCITY[start]], (particles, 1))
+    positions, velocities = (np.array(a, dtype=np.float64) for a in (positions, velocities))
+    for name, array in {"positions": positions, "velocities": velocities}.items():
+        if array.shape != (particles, 3):
+            raise ValueError(f"{name} have shape {array.shape}: ({particles}, 3) is needed")
+        if not np.isfinite(array).all():
+            raise ValueError(f"{name} at the start hold a value that is not finite")
     rng = np.random.default_rng([seed, TRACKED_PARTICLES])
     tracked = rng.choice(particles, TRACKED, replace=False)
     stokes_number = properties.stokes_number
@@ -129,7 +137,7 @@ def settle(
         "save_interval": save_interval,
         "seed": seed,
         "start": start,
-        "start_digest": _digest(positions),
+        "start_digest": _digest(np.stack([positions, velocities])),
         "precision": precision,
         **asdict(properties),
     }
@@ -153,9 +161,7 @@ def settle(
             beta_before, side_force_before = state["beta"], state["side_force"]
             index_before = state["index"]
         else:
-            done, position = 0, positions
-            velocity = np.zeros((particles, 3))
-            velocity[:, 2] = START_VELOCITY[start]
+            done, position, velocity = 0, positions, velocities
         first, began = done, time.monotonic()
         saved = began
         neighbours = NeighbourList(particles, side, blocks)
@@ -217,6 +223,8 @@ def settle(
                 raise SystemExit(f"terminated after step {done} of {steps}, {kept}")
         seconds = time.monotonic() - began
 
+        for file in (trajectory, series):
+            remove_leftovers(file)
         write_trajectory(trajectory, frames, side, attributes)
         write_series(series, rows, tracked, attributes)
         frames.remove()

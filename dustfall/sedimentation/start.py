@@ -1,5 +1,8 @@
-"""Where the particles are when a run starts."""
+"""Where the particles are when a run starts, and how fast."""
 
+from pathlib import Path
+
+import netCDF4
 import numpy as np
 from numba import njit
 
@@ -63,6 +66,59 @@ def random_positions(rng: np.random.Generator, particles: int, volume_fraction: 
         placed = _add(draw, position, placed, head, following, side, cells)
         draws += particles
     return position
+
+
+def read_start(path: str | Path, particles: int, volume_fraction: float):
+    """Read where a run starts: the last frame of a trajectory (.nc), or a table of plain text.
+
+    A trajectory follows the AMBER convention, as those of this package do, with coordinates in d_p
+    and, where it has them, velocities in v_s; its cube is the one that `particles` and
+    `volume_fraction` give. A table has one particle a line: x y z in d_p, or x y z v_x v_y v_z with
+    velocities in v_s; what follows a # is a comment.
+
+    Returns
+    -------
+    positions (n, 3) in d_p, and velocities (n, 3) in v_s or None
+
+    Raises
+    ------
+    FileNotFoundError : there is no such file.
+    ValueError : the file holds something else, another number of particles or another cube.
+    """
+    path = Path(path)
+    if path.suffix == ".nc":
+        with netCDF4.Dataset(path) as file:
+            side = cube_side(particles, volume_fraction)
+            lengths = _last_frame(path, file, "cell_lengths", "d_p")
+            if lengths is not None and not np.allclose(lengths, side, rtol=1e-6):
+                raise ValueError(
+                    f"{path} has a cell of {lengths} d_p: {particles} particles at volume fraction "
+                    f"phi = {volume_fraction:g} fill a cube of {side:.6g} d_p"
+                )
+            positions = _last_frame(path, file, "coordinates", "d_p")
+            velocities = _last_frame(path, file, "velocities", "v_s")
+        if positions is None:
+            raise ValueError(f"{path} has no variable coordinates")
+    else:
+        table = np.loadtxt(path, ndmin=2)
+        if table.shape[1] not in (3, 6):
+            raise ValueError(f"{path} has {table.shape[1]} columns: 3 or 6 are needed")
+        positions, velocities = table[:, :3], table[:, 3:] if table.shape[1] == 6 else None
+    if len(positions) != particles:
+        raise ValueError(f"{path} holds {len(positions)} particles: {particles} are needed")
+    return positions, velocities
+
+
+def _last_frame(path, file, name, units):
+    """Last frame of a variable in float64; None where there is no such variable."""
+    if name not in file.variables:
+        return None
+    found = getattr(file[name], "units", units)
+    if found != units or len(file[name]) == 0:
+        raise ValueError(
+            f"{path} has {len(file[name])} frames of {name} in {found}: {units} needed"
+        )
+    return np.asarray(file[name][-1], dtype=np.float64)
 
 
 @njit(cache=True)

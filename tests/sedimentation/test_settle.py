@@ -3,6 +3,7 @@ import signal
 import subprocess
 import sys
 from itertools import pairwise
+from multiprocessing import get_context
 from pathlib import Path
 
 import netCDF4
@@ -302,6 +303,27 @@ def test_killed_run_goes_on_to_the_same_bits(tmp_path, undisturbed):
         progress=lambda done, total: steps.append(done),
     )
     assert steps == list(range(15, 21))
+    assert_same_files(tmp_path, undisturbed)
+
+
+def test_run_killed_at_ten_random_moments_ends_with_the_same_bits(tmp_path, undisturbed):
+    rng = np.random.default_rng(12)
+    settings = {"checkpoint": tmp_path / "checkpoint", "checkpoint_interval": 0.0}
+    killed = 0
+    while killed < 10:
+        process = get_context("fork").Process(target=run, args=(tmp_path,), kwargs=settings)
+        process.start()
+        process.join(rng.uniform(0.01, 0.1))
+        if process.exitcode is None:
+            process.kill()
+            killed += 1
+        process.join()
+        assert process.exitcode in (0, -signal.SIGKILL)
+        if process.exitcode == 0:  # done before the moment came: once more from the start
+            assert_same_files(tmp_path, undisturbed)
+            for path in tmp_path.iterdir():
+                path.unlink()
+    run(tmp_path, **settings)
     assert_same_files(tmp_path, undisturbed)
 
 

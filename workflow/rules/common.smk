@@ -30,14 +30,15 @@ SHARDS = plan.shards(config)
 TRIALS = plan.trials(config)
 CASES = plan.cases(config)
 
-# The cases at the Galileo number of the properties; those of them with most particles; and the
-# cases that differ in the Galileo number alone.
+# The cases at the Galileo number of the properties; those of them with most particles, from one
+# start each; and the cases that differ in the Galileo number alone.
 PLAIN_CASES = [name for name, case in CASES.items() if case.galileo_multiple == 1]
 LARGEST_CASES = [
     name
     for name in PLAIN_CASES
     if CASES[name].particles == max(config["sedimentation"]["particles"])
     and CASES[name].volume_fraction in config["sedimentation"]["volume_fractions"]
+    and CASES[name].seed == 1
 ]
 GALILEO_CASES = [
     name

@@ -6,6 +6,7 @@ rule sedimentation:
             then=f"results/model/{config['sedimentation']['model']}.safetensors",
             otherwise=[],
         ),
+        start=lambda wc: plan.start_file(config, wc.case),
         library=library("settle.py"),
     output:
         trajectory="results/sedimentation/{case}.nc",
@@ -14,6 +15,10 @@ rule sedimentation:
         "logs/sedimentation/{case}.log",
     benchmark:
         "benchmarks/sedimentation/{case}.tsv"
+    threads: config["sedimentation"]["threads"]
+    # Not a parameter, because it changes no result.
+    resources:
+        checkpoint_interval=config["sedimentation"]["checkpoint_interval"],
     params:
         seed=lambda wc: plan.case_seed(config, wc.case),
         model=config["sedimentation"]["model"],
@@ -26,5 +31,6 @@ rule sedimentation:
         step=config["sedimentation"]["step"],
         duration=config["sedimentation"]["duration"],
         save_every=config["sedimentation"]["save_every"],
+        precision=config["sedimentation"]["precision"],
     script:
         "../scripts/settle.py"

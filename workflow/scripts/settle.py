@@ -9,6 +9,7 @@ from dustfall.forces.models import load_model
 from dustfall.forces.rotne_prager import IsolatedStokes, RotnePrager
 from dustfall.sedimentation.properties import Properties
 from dustfall.sedimentation.settle import settle
+from dustfall.sedimentation.start import read_start
 
 progress = joblog.start(snakemake.log[0])
 params, case = snakemake.params, snakemake.wildcards.case
@@ -21,9 +22,17 @@ else:
     model = load_model(snakemake.input.model)
 properties = Properties(**params.properties)
 
-# A killed run goes on from its checkpoint, unless a setting or the model has changed since.
-weights = Path(snakemake.input.model).read_bytes() if snakemake.input.model else b""
-state = hashlib.sha256(repr(sorted(params.items())).encode() + weights).hexdigest()[:16]
+positions = velocities = None
+if snakemake.input.start:
+    positions, velocities = read_start(
+        snakemake.input.start, params.particles, params.volume_fraction
+    )
+
+# A killed run goes on from its checkpoint, unless a setting or a file has changed since.
+state = hashlib.sha256(repr(sorted(params.items())).encode())
+for file in (snakemake.input.model, snakemake.input.start):
+    state.update(Path(file).read_bytes() if file else b"none")
+state = state.hexdigest()[:16]
 checkpoints = Path(snakemake.output.trajectory).parent / "checkpoints"
 for stale in checkpoints.glob(f"{case}-*"):
     if stale.name != f"{case}-{state}":
@@ -41,7 +50,12 @@ done = settle(
     snakemake.output.trajectory,
     snakemake.output.series,
     start=params.start,
+    positions=positions,
+    velocities=velocities,
+    precision=params.precision,
     checkpoint=checkpoints / f"{case}-{state}",
+    checkpoint_interval=snakemake.resources.checkpoint_interval,
+    threads=snakemake.threads,
     progress=progress(case, "steps"),
 )
 print(f"{done['steps']} steps in {done['seconds']:.1f} s, {done['steps_per_second']:.3g} a second")
