@@ -1,6 +1,7 @@
 # The campaign: random scenes, boundary-element forces, force models, sedimentation, figures.
 # `snakemake -n` shows the plan, `snakemake all` runs it, `snakemake figures` makes the figures,
-# `snakemake benchmarks` times the Stokes solver, `snakemake studies` compares time steps.
+# `snakemake exports` writes trajectories for ParaView, `snakemake benchmarks` times the solver,
+# `snakemake studies` compares time steps.
 import json
 import os
 import sys
@@ -36,6 +37,7 @@ include: "workflow/rules/stokes.smk"
 include: "workflow/rules/dataset.smk"
 include: "workflow/rules/idnn.smk"
 include: "workflow/rules/sedimentation.smk"
+include: "workflow/rules/exports.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/benchmarks.smk"
 include: "workflow/rules/studies.smk"
@@ -55,6 +57,12 @@ rule figures:
     """The figures, and whatever they need."""
     input:
         FIGURES,
+
+
+rule exports:
+    """Trajectories for ParaView; no part of `all`, as they repeat what is there already."""
+    input:
+        expand("results/exports/{case}.vtkhdf", case=CASES),
 
 
 rule benchmarks:

@@ -52,6 +52,10 @@ def test_figures_is_a_target_that_leaves_the_tables_out(project):
     assert all(f"figure_{name}" in jobs for name in FIGURES)
 
 
+def test_exports_is_a_target_with_every_case(project):
+    assert project.plan("--", "exports")["export"] == 3 * 6 + 2
+
+
 @pytest.mark.parametrize(("number", "size"), [(120, 40), (121, 40), (119, 40), (120, 1000)])
 def test_shards_hold_every_scene_once(number, size):
     config = configure({"scenes": {"number": {"uniform": number, "ball": 7}, "shard_size": size}})

@@ -1,0 +1,99 @@
+"""VTKHDF files hold every frame of the trajectory, where their tables say that it is."""
+
+from itertools import pairwise
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+
+from dustfall.forces.rotne_prager import IsolatedStokes
+from dustfall.sedimentation import Properties, settle
+from dustfall.sedimentation.export import CELL_KINDS, export_vtkhdf
+
+PARTICLES = 40
+
+
+@pytest.fixture(scope="module")
+def trajectory(tmp_path_factory):
+    path = tmp_path_factory.mktemp("run") / "case.nc"
+    settle(
+        IsolatedStokes(), Properties(), PARTICLES, 1e-3, 0.5, 6.0, 2.0, 1, path,
+        path.with_suffix(".series.nc"), start="stokes",
+    )  # fmt: skip
+    return path
+
+
+def frame(file, k):
+    """Points, vertices and point data of one time step, found as the format's text says."""
+    root, steps = file["VTKHDF"], file["VTKHDF/Steps"]
+    part, first = steps["PartOffsets"][k], steps["PointOffsets"][k]
+    points = root["Points"][first : first + root["NumberOfPoints"][part]]
+    data = {}
+    for name, begins in steps["PointDataOffsets"].items():
+        data[name] = root["PointData"][name][begins[k] : begins[k] + len(points)]
+    cells = {}
+    for i, kind in enumerate(CELL_KINDS):
+        begin = steps["CellOffsets"][k, i]
+        number = root[kind]["NumberOfCells"][part]
+        offsets = root[kind]["Offsets"][begin : begin + number + 1]
+        ids = root[kind]["Connectivity"][steps["ConnectivityIdOffsets"][k, i] :]
+        cells[kind] = [ids[a:b].tolist() for a, b in pairwise(offsets)]
+    return points, cells, data
+
+
+def test_every_frame_is_found_again(trajectory, tmp_path):
+    seen = []
+    export_vtkhdf(
+        trajectory, tmp_path / "case.vtkhdf", folded=False, progress=lambda *a: seen.append(a)
+    )
+    source = xr.load_dataset(trajectory)
+    with h5py.File(tmp_path / "case.vtkhdf") as file:
+        assert file["VTKHDF"].attrs["Type"] == b"PolyData"
+        np.testing.assert_array_equal(file["VTKHDF/Steps/Values"], source["time"])
+        assert file["VTKHDF/Steps"].attrs["NSteps"] == source.sizes["frame"] == 4
+        for k in range(4):
+            points, cells, data = frame(file, k)
+            np.testing.assert_array_equal(points, source["coordinates"][k])
+            np.testing.assert_array_equal(data["velocities"], source["velocities"][k])
+            np.testing.assert_array_equal(data["drag_coefficient"], source["drag_coefficient"][k])
+            np.testing.assert_array_equal(data["particle"], np.arange(PARTICLES))
+            assert cells.pop("Vertices") == [[i] for i in range(PARTICLES)]
+            assert set(map(len, cells.values())) == {0}
+    assert seen == [(k, 4) for k in (1, 2, 3, 4)]
+
+
+def test_folded_points_lie_in_the_cube_whole_sides_from_where_they_are(trajectory, tmp_path):
+    export_vtkhdf(trajectory, tmp_path / "case.vtkhdf")
+    source = xr.load_dataset(trajectory)
+    side = source["cell_lengths"].values[0, 0]
+    with h5py.File(tmp_path / "case.vtkhdf") as file:
+        points = frame(file, 3)[0]
+    assert (points >= 0).all()
+    assert (points < np.float32(side)).all()
+    sides = (points - source["coordinates"][3].values) / side
+    np.testing.assert_allclose(sides, sides.round(), atol=1e-5)
+    assert np.abs(sides).max() > 1.5
+
+
+def test_units_and_the_settings_of_the_run_come_along(trajectory, tmp_path):
+    export_vtkhdf(trajectory, tmp_path / "case.vtkhdf")
+    with h5py.File(tmp_path / "case.vtkhdf") as file:
+        units = {
+            name: file["VTKHDF"][name].attrs["units"]
+            for name in ("Points", "PointData/velocities", "Steps/Values")
+        }
+        assert units == {"Points": "d_p", "PointData/velocities": "v_s", "Steps/Values": "tau"}
+        assert file["run"].attrs["volume_fraction"] == 1e-3
+        assert "kg m^-3" in file["run"].attrs["units"]
+
+
+def test_other_files_are_refused_and_leave_nothing(trajectory, tmp_path):
+    series = trajectory.with_suffix(".series.nc")
+    with pytest.raises(ValueError, match=r"no variable 'coordinates'"):
+        export_vtkhdf(series, tmp_path / "case.vtkhdf")
+    empty = tmp_path / "empty.nc"
+    xr.load_dataset(trajectory).isel(frame=slice(0, 0)).to_netcdf(empty, unlimited_dims=["frame"])
+    with pytest.raises(ValueError, match="no frame"):
+        export_vtkhdf(empty, tmp_path / "case.vtkhdf")
+    assert [path.name for path in tmp_path.iterdir()] == ["empty.nc"]

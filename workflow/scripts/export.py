@@ -1,0 +1,12 @@
+"""Put the frames of a trajectory into one file that ParaView opens."""
+
+import joblog
+from dustfall.sedimentation.export import export_vtkhdf
+
+progress = joblog.start(snakemake.log[0])
+export_vtkhdf(
+    snakemake.input.trajectory,
+    snakemake.output[0],
+    folded=snakemake.params.positions == "folded",
+    progress=progress(snakemake.wildcards.case, "frames"),
+)
