@@ -35,6 +35,11 @@ inverted Rotne-Prager mobility of the six spheres."""
 BATCHELOR_COEFFICIENT = -6.55
 """Settling velocity of a dilute random suspension is 1 + this times phi (Batchelor 1972)."""
 
+DEL_BELLO = {"volume_fraction": 1e-3, "value": 4.0, "low": 1.0, "high": 4.0}
+"""Volcanic ash (125 to 500 micrometres) in air, in the laboratory and in two- and four-way coupled
+simulations, phi = 1e-7 to 1e-3: particles that settle together exceed a lone one's velocity by up
+to 4 times at phi of about 1e-3 (Del Bello et al. 2017, doi:10.1038/srep39620, abstract)."""
+
 POISSON_VORONOI_VARIANCE = 0.179032
 """Variance of V/mean(V) of the Voronoï cells of random points (integral of Gilbert 1962)."""
 

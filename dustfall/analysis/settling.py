@@ -10,6 +10,7 @@ from scipy import stats
 
 from dustfall.analysis.references import (
     BATCHELOR_COEFFICIENT,
+    DEL_BELLO,
     PAPER_STEADY_STATE,
     RANDOM_START,
 )
@@ -146,7 +147,7 @@ def steady_state(
     particles with the measured variance.
 
     Returns the columns model, n, volume_fraction, galileo, quantity, value, low, high,
-    standard_error, correlation_time [tau], runs; sorted.
+    standard_error, degrees_of_freedom, correlation_time [tau], runs; sorted.
 
     Raises ValueError where the series lacks the quantity, an attribute, or ten steps after `start`.
     """
@@ -178,6 +179,7 @@ def steady_state(
                 "low": mean.value - mean.half_width,
                 "high": mean.value + mean.half_width,
                 "standard_error": mean.standard_error,
+                "degrees_of_freedom": mean.degrees_of_freedom,
                 "correlation_time": float(
                     np.mean([m.correlation_length * dt for m, dt in entries])
                 ),
@@ -192,7 +194,8 @@ def inverse_beta_table(steady: pd.DataFrame) -> pd.DataFrame:
 
     Parameters: `steady` as `steady_state` returns it; the rows of the lowest Galileo number of
     each (model, n, phi) are kept. Returns the columns source, model, n, volume_fraction, value,
-    low, high, runs, with source "simulation", "paper", "random start" or "Batchelor 1972".
+    low, high, runs, with source "simulation", "paper", "random start", "Batchelor 1972" or "Del
+    Bello 2017".
 
     Raises ValueError for an empty table.
     """
@@ -208,6 +211,7 @@ def inverse_beta_table(steady: pd.DataFrame) -> pd.DataFrame:
             PAPER_STEADY_STATE.assign(source="paper"),
             RANDOM_START.assign(source="random start"),
             batchelor.assign(source="Batchelor 1972"),
+            pd.DataFrame([DEL_BELLO]).assign(source="Del Bello 2017"),
         ],
         ignore_index=True,
     )

@@ -5,7 +5,7 @@ import pandas as pd
 from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
 
 from dustfall.figures.style import (
     CATEGORY_COLOURS,
@@ -24,42 +24,105 @@ from dustfall.figures.style import (
 PARTICLE_COLOURS = ("#d55e00", "#009e73", "#0072b2")
 """The paper's red, green and blue, in the set that the colour-blind can tell apart."""
 
+MODEL_NAMES = {
+    "idnn": "IDNN",
+    "anchored": "anchored IDNN",
+    "dense": "dense network",
+    "rotne_prager": "Rotne-Prager inverse",
+    "stokes": "isolated Stokes",
+}
+"""What a force model is called in a legend, by its `name`."""
+
+ASH = "volcanic ash, up to (Del Bello et al. 2017)"
+
 
 @styled
 def inverse_beta(frame: pd.DataFrame) -> Figure:
-    """Steady settling velocity against volume fraction for each n, beside what others have.
+    """Steady settling velocity against volume fraction: for each n, and for each force model.
 
     `frame`: source, model, n, volume_fraction, value, low, high, as
-    `analysis.settling.inverse_beta_table` gives. Raises ValueError for a missing column or a table
-    without simulations.
+    `analysis.settling.inverse_beta_table` gives. Left the model with most cases, beside what others
+    have; right the models at the smallest n that all of them ran with. Raises ValueError for a
+    missing column or a table without simulations.
     """
     columns = ["source", "model", "n", "volume_fraction", "value", "low", "high"]
     require(frame, columns, "inverse_beta")
     simulation = frame[frame["source"] == "simulation"]
     if simulation.empty:
         raise ValueError("the table of inverse_beta has no rows of source 'simulation'")
-    figure = new_figure(1.4 * SINGLE, 3.4)
-    ax = figure.subplots()
-    several = simulation["model"].nunique() > 1
-    for m, (model, of_model) in enumerate(simulation.groupby("model")):
-        for i, (n, rows) in enumerate(of_model.groupby("n")):
-            rows = rows.sort_values("volume_fraction")
-            error = np.nan_to_num([rows["value"] - rows["low"], rows["high"] - rows["value"]])
-            label = f"$n = {int(n):,}$".replace(",", r"\,")
-            ax.errorbar(
-                rows["volume_fraction"],
-                rows["value"],
-                yerr=error,
-                color=CATEGORY_COLOURS[(m if several else i) % len(CATEGORY_COLOURS)],
-                marker=MARKERS[i % len(MARKERS)],
-                mfc="none",
-                ms=4 + 2 * i,
-                lw=0.9,
-                elinewidth=0.9,
-                capsize=2.5,
-                label=f"{model}, {label}" if several else label,
-                zorder=4 - 0.1 * i,
-            )
+    figure = new_figure(DOUBLE, 3.5)
+    left, right = figure.subplots(1, 2)
+    principal = simulation["model"].value_counts().index[0]
+    numbers = simulation[simulation["model"] == principal].groupby("n")
+    for i, (n, rows) in enumerate(numbers):
+        _settling_curve(left, rows, i, _number(n))
+    compared = _models_at_one_number(simulation, principal)
+    for i, (model, rows) in enumerate(compared):
+        _settling_curve(right, rows, i, MODEL_NAMES.get(model, model))
+
+    _paper_and_random_start(left, frame)
+    _batchelor(left, frame)
+    _batchelor(right, frame)
+    ash = frame[frame["source"] == "Del Bello 2017"]
+    right.plot(
+        ash["volume_fraction"], ash["value"], ls="none", marker="_", ms=9, color="k", label=ASH
+    )
+    right.vlines(ash["volume_fraction"], ash["low"], ash["high"], color="k", lw=0.9)
+    right.set_yscale("log")
+    right.yaxis.set_major_locator(FixedLocator([1, 1.5, 2, 3, 4]))
+    right.yaxis.set_major_formatter("{x:g}")
+    right.yaxis.set_minor_locator(NullLocator())
+    for ax in (left, right):
+        ax.set_xscale("log")
+        ax.set_xlabel(r"volume fraction $\varphi$")
+        handles, labels = ax.get_legend_handles_labels()
+        ours = [isinstance(handle, ErrorbarContainer) for handle in handles]
+        order = np.argsort(np.logical_not(ours), kind="stable")
+        ax.legend([handles[i] for i in order], [labels[i] for i in order], loc="upper left")
+    left.set_title(MODEL_NAMES.get(principal, principal), loc="left")
+    right.set_title(f"force models, {_number(compared[0][1]['n'].iloc[0])}", loc="left")
+    left.set_ylabel(r"$\langle v_s\rangle / v_{s,\mathrm{Stokes}} = 1/\beta$")
+    return figure
+
+
+def _number(n):
+    """Number of particles, with thin spaces between thousands."""
+    return f"$n = {int(n):,}$".replace(",", r"\,")
+
+
+def _settling_curve(ax, rows, i, label):
+    """One curve with its intervals; markers of later curves are larger, so that none is hidden."""
+    rows = rows.sort_values("volume_fraction")
+    ax.errorbar(
+        rows["volume_fraction"],
+        rows["value"],
+        yerr=np.nan_to_num([rows["value"] - rows["low"], rows["high"] - rows["value"]]),
+        color=CATEGORY_COLOURS[i % len(CATEGORY_COLOURS)],
+        marker=MARKERS[i % len(MARKERS)],
+        mfc="none",
+        ms=4 + 1.5 * i,
+        lw=0.9,
+        elinewidth=0.9,
+        capsize=2.5,
+        label=label,
+        zorder=4 - 0.1 * i,
+    )
+
+
+def _models_at_one_number(simulation, principal):
+    """Rows of each model, the principal one first, at the smallest n that all models have.
+
+    Where they have none in common, the principal model's smallest counts.
+    """
+    models = simulation.groupby("model")
+    shared = set.intersection(*(set(rows["n"]) for _, rows in models))
+    if not shared:
+        shared = set(simulation.loc[simulation["model"] == principal, "n"])
+    rows = simulation[simulation["n"] == min(shared)]
+    return sorted(rows.groupby("model"), key=lambda group: group[0] != principal)
+
+
+def _paper_and_random_start(ax, frame):
     paper = frame[frame["source"] == "paper"]
     ax.plot(
         paper["volume_fraction"],
@@ -73,21 +136,15 @@ def inverse_beta(frame: pd.DataFrame) -> Figure:
     )
     ranges = paper.dropna(subset=["low", "high"])
     ax.vlines(ranges["volume_fraction"], ranges["low"], ranges["high"], color="k", lw=0.9)
-    for source, line, label in (
-        ("random start", "--", r"random start, $\overline{1/\beta}$ (Rotne-Prager)"),
-        ("Batchelor 1972", ":", r"infinite suspension, $1 - 6.55\,\varphi$"),
-    ):
-        rows = frame[frame["source"] == source].sort_values("volume_fraction")
-        ax.plot(rows["volume_fraction"], rows["value"], color=REFERENCE, ls=line, label=label)
-    ax.set_xscale("log")
-    ax.set_xlabel(r"volume fraction $\varphi$")
-    ax.set_ylabel(r"$\langle v_s\rangle / v_{s,\mathrm{Stokes}} = 1/\beta$")
-    handles, labels = ax.get_legend_handles_labels()
-    ours = [i for i, handle in enumerate(handles) if isinstance(handle, ErrorbarContainer)]
-    others = [i for i in range(len(handles)) if i not in ours]
-    order = ours + others
-    ax.legend([handles[i] for i in order], [labels[i] for i in order], loc="upper left")
-    return figure
+    rows = frame[frame["source"] == "random start"].sort_values("volume_fraction")
+    label = r"random start, $\overline{1/\beta}$ (Rotne-Prager)"
+    ax.plot(rows["volume_fraction"], rows["value"], color=REFERENCE, ls="--", label=label)
+
+
+def _batchelor(ax, frame):
+    rows = frame[frame["source"] == "Batchelor 1972"].sort_values("volume_fraction")
+    label = r"infinite suspension, $1 - 6.55\,\varphi$"
+    ax.plot(rows["volume_fraction"], rows["value"], color=REFERENCE, ls=":", label=label)
 
 
 @styled
@@ -116,7 +173,7 @@ def settling_in_time(frame: pd.DataFrame) -> Figure:
             variance = rows["variance"].where(rows["variance"] > 0)
             lower.plot(rows["time"], variance, color=phi_colour(phi), lw=1, ls=(0, (4, 1.2)))
         upper.axhline(1, color=REFERENCE, lw=0.6, zorder=0)
-        upper.set_title(f"$n = {int(n):,}$".replace(",", r"\,"))
+        upper.set_title(_number(n))
         lower.set_yscale("log")
         lower.set_xlabel(r"time $t/\tau$")
     variance = frame["variance"][frame["variance"] > 0]

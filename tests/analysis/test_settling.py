@@ -109,6 +109,7 @@ def test_inverse_beta_table_holds_simulation_and_references_at_the_lowest_galile
     value = table.set_index(["source", "volume_fraction"])["value"]
     assert value["paper", 1e-3] == 1.39
     assert value["random start", 1e-3] == 1.458
+    assert value["Del Bello 2017", 1e-3] == 4
     batchelor = table[table["source"] == "Batchelor 1972"]
     assert batchelor["value"].iloc[-1] == pytest.approx(1 - 6.55e-3)
     with pytest.raises(ValueError, match="empty"):

@@ -76,7 +76,8 @@ def inverse_beta():
             for phi in PHI
         ]
     )
-    return inverse_beta_table(steady)
+    other = steady[steady["n"] == 1000].assign(model="rotne_prager")
+    return inverse_beta_table(pd.concat([steady, other]))
 
 
 def settling_in_time():
@@ -227,6 +228,14 @@ def test_panels_with_two_views_draw_both():
     assert pairs(table, "time", "mean") | pairs(moving, "time", "variance") <= drawn
     table = mesh_study()
     assert pairs(table, "nodes", "error") <= drawn_points(figures.mesh_study(table))
+
+
+def test_force_models_stand_in_a_panel_of_their_own_at_the_n_that_they_share():
+    left, right = figures.inverse_beta(inverse_beta()).axes
+    assert left.get_title(loc="left") == "IDNN"
+    assert r"1\,000" in right.get_title(loc="left")
+    labels = [text.get_text() for text in right.get_legend().get_texts()]
+    assert labels[:2] == ["IDNN", "Rotne-Prager inverse"]
 
 
 def test_ridges_are_the_densities_on_one_scale_within_a_decade():
