@@ -1,6 +1,7 @@
 """One function a figure, from the tidy table that is saved beside it to a matplotlib Figure."""
 
 from dustfall.figures.forces import force_pdf, force_scatter, predicted_vs_target, spearman
+from dustfall.figures.frozen_cloud import frozen_cloud
 from dustfall.figures.mesh import mesh_study
 from dustfall.figures.settling import (
     inverse_beta,
@@ -14,6 +15,7 @@ from dustfall.figures.voronoi import voronoi_pdf, voronoi_variance
 __all__ = [
     "force_pdf",
     "force_scatter",
+    "frozen_cloud",
     "inverse_beta",
     "mesh_study",
     "phase_and_spectra",

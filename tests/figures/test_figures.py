@@ -156,6 +156,21 @@ def voronoi_variance():
     return pd.DataFrame(rows)
 
 
+def frozen_cloud():
+    def rows(panel, source, x, phi=1e-3):
+        y = 1 - 0.1 * np.asarray(x, dtype=float) ** 0.2
+        head = {"panel": panel, "source": source, "volume_fraction": phi}
+        return pd.DataFrame(head | {"x": x, "y": y, "low": y - 0.01, "high": y + 0.01})
+
+    tables = [rows("neighbours", "nearest neighbours", [1.0, 5.0, 50.0], phi) for phi in PHI]
+    tables += [rows("particles", "one cloud", rng().uniform(0.5, 0.8, 30)).drop(columns="low")]
+    tables += [rows("correlation", "five neighbours, all particles", [1e-3])]
+    sources = ("five neighbours", "all particles", "Batchelor 1972")
+    tables += [rows("settling", source, list(PHI), list(PHI)) for source in sources]
+    tables += [rows("drag", source, list(PHI), list(PHI)) for source in sources[:2]]
+    return pd.concat(tables, ignore_index=True)
+
+
 def mesh_study():
     nodes = np.array([50, 100, 200])
     study = [
@@ -176,6 +191,7 @@ TABLES = {
         settling_in_time,
         phase_and_spectra,
         trajectories,
+        frozen_cloud,
         voronoi_pdf,
         voronoi_variance,
         mesh_study,
@@ -226,6 +242,8 @@ def test_panels_with_two_views_draw_both():
     drawn = drawn_points(figures.settling_in_time(table))
     moving = table[table["variance"] > 0]
     assert pairs(table, "time", "mean") | pairs(moving, "time", "variance") <= drawn
+    table = frozen_cloud().query("panel != 'correlation'")
+    assert pairs(table, "x", "y") <= drawn_points(figures.frozen_cloud(frozen_cloud()))
     table = mesh_study()
     assert pairs(table, "nodes", "error") <= drawn_points(figures.mesh_study(table))
 
@@ -301,7 +319,14 @@ def test_empty_tables_and_missing_columns_are_refused(name):
 
 @pytest.mark.parametrize(
     "name",
-    ["force_pdf", "settling_in_time", "phase_and_spectra", "trajectories", "voronoi_pdf"],
+    [
+        "force_pdf",
+        "settling_in_time",
+        "phase_and_spectra",
+        "trajectories",
+        "frozen_cloud",
+        "voronoi_pdf",
+    ],
 )
 def test_a_curve_needs_two_rows(name):
     with pytest.raises(ValueError, match=f"{name} has 1 rows"):

@@ -25,7 +25,7 @@ FROM_DATA = {"dataset": 1, **DATA_FIGURES, **MODELS, **SETTLING}
 def test_every_figure_is_there_with_its_numbers(campaign):
     folder = campaign.folder / "results/figures"
     pictures = sorted(folder.glob("*.png"))
-    assert len(pictures) == 11
+    assert len(pictures) == 12
     for picture in pictures:
         assert picture.read_bytes().startswith(b"\x89PNG")
         assert picture.with_suffix(".pdf").read_bytes().startswith(b"%PDF")

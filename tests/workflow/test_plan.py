@@ -16,6 +16,7 @@ FIGURES = [
     "voronoi_pdf",
     "voronoi_variance",
     "trajectories",
+    "frozen_cloud",
     "mesh_study",
 ]
 

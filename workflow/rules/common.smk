@@ -63,6 +63,7 @@ FIGURES = expand(
         "voronoi_pdf",
         "voronoi_variance",
         "trajectories",
+        "frozen_cloud",
         "mesh_study",
     ],
     ending=["png", "pdf", "csv"],

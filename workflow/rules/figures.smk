@@ -178,6 +178,25 @@ rule figure_voronoi_variance:
         "../scripts/figure_voronoi_variance.py"
 
 
+rule figure_frozen_cloud:
+    """Five neighbours against all particles in frozen random clouds."""
+    input:
+        library=library("figure_frozen_cloud.py"),
+    output:
+        **figure("frozen_cloud", "Sedimentation"),
+    log:
+        "logs/figures/frozen_cloud.log",
+    benchmark:
+        "benchmarks/figures/frozen_cloud.tsv"
+    params:
+        seed=config["seed"],
+        volume_fractions=config["sedimentation"]["volume_fractions"],
+        particles=config["figures"]["frozen_cloud"]["particles"],
+        clouds=config["figures"]["frozen_cloud"]["clouds"],
+    script:
+        "../scripts/figure_frozen_cloud.py"
+
+
 rule figure_mesh_study:
     """Drag on an isolated sphere against mesh size."""
     input:

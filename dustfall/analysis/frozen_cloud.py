@@ -1,0 +1,125 @@
+"""What five neighbours leave out: forces in a frozen random cloud, from few neighbours to all."""
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+from scipy.spatial import cKDTree
+
+from dustfall import STOKES_DRAG
+from dustfall.analysis.periodic_mobility import HASIMOTO, RADIUS, periodic_mobility
+from dustfall.analysis.references import BATCHELOR_COEFFICIENT
+from dustfall.forces.rotne_prager import RotnePrager, rotne_prager_forces
+from dustfall.sedimentation.neighbours import nearest_neighbours
+from dustfall.sedimentation.start import cube_side, random_positions
+
+FLOW = 1
+"""Axis of the flow, as in the force models: y."""
+
+COUNTS = (1, 2, 5, 10, 20, 50, 100, 200, 400)
+"""Neighbours that a particle is given in turn."""
+
+REFERENCES = 25
+"""Particles of a cloud that are given many neighbours, each a dense system of its own."""
+
+
+def five_neighbour_drag(positions, side: float) -> np.ndarray:
+    """Drag (n,) over Stokes drag on each sphere of a periodic cloud fixed in a uniform flow.
+
+    Each sphere sees its five nearest alone, in unbounded fluid (inverted Rotne-Prager mobility).
+    """
+    neighbours, _ = nearest_neighbours(positions, side)
+    return RotnePrager().predict(neighbours)[:, FLOW] / STOKES_DRAG
+
+
+def drag_among_nearest(positions, side: float, references, count: int) -> np.ndarray:
+    """Drag over Stokes drag on some spheres of a periodic cloud, each among its `count` nearest.
+
+    Raises ValueError where these would reach beyond half the side, where images are met twice.
+    """
+    tree = cKDTree(positions % side, boxsize=side)
+    distance, index = tree.query(positions[references] % side, count + 1)
+    if distance.max() > side / 2:
+        raise ValueError(
+            f"{count} neighbours reach {distance.max():.4g} d_p, more than half the side of "
+            f"{side:.4g} d_p; the cloud needs more than {len(positions)} particles"
+        )
+    drag = np.empty(len(index))
+    for i, those in enumerate(index):
+        centres = positions[those] - positions[those[0]]
+        centres -= side * np.rint(centres / side)
+        drag[i] = rotne_prager_forces(centres)[0, FLOW] / STOKES_DRAG
+    return drag
+
+
+def all_particle_motion(positions, side: float) -> tuple[np.ndarray, np.ndarray]:
+    """Drag and settling velocity (n,) with all spheres and images, over those of a lone sphere.
+
+    No net flux of spheres and fluid together (`periodic_mobility`). The drag is that on spheres
+    which all move with the same velocity, the velocity that under equal weights. A cube of finite
+    side slows the cloud by Hasimoto's correction, which is added back to the velocity, so that its
+    mean stands for an infinite suspension (Ladd 1990, J. Chem. Phys. 93, 3484).
+    """
+    mobility = periodic_mobility(positions, side)
+    along = np.tile(np.eye(3)[FLOW], len(positions))
+    drag = np.linalg.solve(mobility, along).reshape(-1, 3)[:, FLOW]
+    velocity = (mobility @ along).reshape(-1, 3)[:, FLOW]
+    return drag, velocity + HASIMOTO * RADIUS / side
+
+
+def frozen_cloud_table(
+    volume_fractions, particles: int, clouds: int, seed: int, progress=None
+) -> pd.DataFrame:
+    """Compare the five-neighbour closure with all particles, in random clouds without overlap.
+
+    Parameters: `volume_fractions`, `particles` of a cloud, `clouds` of each volume fraction (at
+    least two), `seed`, `progress` (clouds done, of all).
+
+    Returns the columns panel, source, volume_fraction, x, y, low, high (95 % interval of the mean,
+    from the spread between clouds). Panel "neighbours": mean drag y among x neighbours in unbounded
+    fluid. Panel "particles": five-neighbour drag x and all-particle drag y of each sphere of the
+    densest case's first cloud. Panel "correlation": their coefficient y at phi = x. Panel
+    "settling": velocity y at phi = x of the sources "five neighbours" (mean 1/beta), "all
+    particles" and "Batchelor 1972"; panel "drag": the mean drag of the first two.
+
+    Raises ValueError for fewer than two clouds.
+    """
+    if clouds < 2:
+        raise ValueError(f"clouds is {clouds}: an interval needs at least 2")
+    counts = [count for count in COUNTS if count <= particles / 2.2]
+    rows = []
+    for case, phi in enumerate(volume_fractions):
+        found: dict[tuple, list[float]] = {}
+        for cloud in range(clouds):
+            rng = np.random.default_rng([seed, case, cloud])
+            side = cube_side(particles, phi)
+            positions = random_positions(rng, particles, phi)
+            five = five_neighbour_drag(positions, side)
+            drag, velocity = all_particle_motion(positions, side)
+            means = {
+                ("drag", "five neighbours", phi): five.mean(),
+                ("drag", "all particles", phi): drag.mean(),
+                ("correlation", "five neighbours, all particles", phi): np.corrcoef(five, drag)[
+                    0, 1
+                ],
+                ("settling", "five neighbours", phi): (1 / five).mean(),
+                ("settling", "all particles", phi): velocity.mean(),
+            }
+            for count in counts:
+                some = drag_among_nearest(positions, side, slice(REFERENCES), count)
+                means["neighbours", "nearest neighbours", count] = some.mean()
+            for key, value in means.items():
+                found.setdefault(key, []).append(value)
+            if phi == max(volume_fractions) and cloud == 0:
+                head = {"panel": "particles", "source": "one cloud", "volume_fraction": phi}
+                rows += [head | {"x": x, "y": y} for x, y in zip(five, drag, strict=True)]
+            if progress:
+                progress(case * clouds + cloud + 1, len(volume_fractions) * clouds)
+        for (panel, source, x), values in found.items():
+            mean = np.mean(values)
+            half = stats.t.ppf(0.975, clouds - 1) * np.std(values, ddof=1) / np.sqrt(clouds)
+            head = {"panel": panel, "source": source, "volume_fraction": phi, "x": x}
+            rows.append(head | {"y": mean, "low": mean - half, "high": mean + half})
+        head = {"panel": "settling", "source": "Batchelor 1972", "volume_fraction": phi, "x": phi}
+        rows.append(head | {"y": 1 + BATCHELOR_COEFFICIENT * phi})
+    table = pd.DataFrame(rows)[["panel", "source", "volume_fraction", "x", "y", "low", "high"]]
+    return table.sort_values(["panel", "source", "volume_fraction", "x"], ignore_index=True)
