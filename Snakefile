@@ -50,6 +50,8 @@ rule all:
         "results/config.yaml",
         "results/dataset/summary.csv",
         "results/model/evaluation.csv",
+        "results/analysis/independence_of_n.csv",
+        "results/analysis/neighbour_changes.csv",
         FIGURES,
 
 

@@ -133,6 +133,27 @@ def from_time(dataset: xr.Dataset, start: float, dimension: str) -> xr.Dataset:
     return part
 
 
+def even_interval(time) -> float:
+    """Interval of evenly spaced times (m,); ValueError where they are uneven or fewer than four."""
+    time = np.asarray(time, dtype=float)
+    if len(time) < 4:
+        raise ValueError(f"{len(time)} samples lie in the steady state; at least 4 are needed")
+    interval = (time[-1] - time[0]) / (len(time) - 1)
+    if not np.allclose(np.diff(time), interval, rtol=1e-3):
+        raise ValueError("the samples are unevenly spaced in time")
+    return float(interval)
+
+
+def settling_velocities(trajectory: xr.Dataset, start: float) -> tuple[np.ndarray, float]:
+    """Downward velocities (frames, n) [v_s] of all particles from `start` [tau] on.
+
+    Also returns the interval between frames [tau]. Raises ValueError where fewer than four frames
+    lie after `start`, or they are uneven.
+    """
+    part = from_time(trajectory, start, "frame")
+    return -part["velocities"][:, :, 2].values.astype(float), even_interval(part["time"])
+
+
 def steady_state(
     runs: Iterable[xr.Dataset], start: float, quantity="settling_velocity_mean", confidence=0.95
 ) -> pd.DataFrame:

@@ -5,13 +5,24 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 import xarray as xr
-from scipy import signal, special
+from scipy import signal, special, stats
 
-from dustfall.analysis.settling import case_of, from_time
+from dustfall.analysis.settling import (
+    case_of,
+    even_interval,
+    from_time,
+    settling_velocities,
+)
 
 METHODS = ("periodogram", "welch")
 
 BINS_PER_DECADE = 20
+
+SHORTEST_SEGMENT = 24
+"""Samples of a Welch segment at least: with fewer the window hides what the spectrum is."""
+
+SLABS = 10
+"""Parts of a cloud that the slope of its spectrum is found without, each in turn."""
 
 
 @dataclass(frozen=True)
@@ -29,12 +40,12 @@ class PowerLaw:
 def power_spectral_density(
     values, interval, method="periodogram", window="boxcar", segment=None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """One-sided power spectral density of an evenly sampled series about its mean.
+    """One-sided power spectral density of evenly sampled series about their means.
 
-    Parameters: `values` (m,), `interval` between samples, `method` "periodogram" or "welch"
+    Parameters: `values` (..., m), `interval` between samples, `method` "periodogram" or "welch"
     (halved overlap, Hann unless `window` says otherwise), `segment` the samples of a Welch segment
-    (default m/8). Returns the frequencies f >= 0 [1/unit of interval] and the density
-    [unit of values squared times unit of interval].
+    (default m/8, but at least 24). Returns the frequencies f >= 0 [1/unit of interval] and the
+    density (..., frequencies) [unit of values squared times unit of interval].
 
     Parseval: for the plain periodogram sum(density) * f[1] is the variance to rounding, for odd
     and even m. A boxcar leaks the jump between last and first value as f^-2 into high frequencies,
@@ -44,20 +55,21 @@ def power_spectral_density(
     or an interval or a segment out of range.
     """
     x = np.asarray(values, dtype=float)
-    if x.ndim != 1 or x.size < 4:
+    samples = x.shape[-1] if x.ndim else 0
+    if samples < 4:
         raise ValueError(f"a series of shape {x.shape} has no spectrum; at least 4 values")
     if not np.isfinite(x).all():
-        raise ValueError(f"value {int(np.flatnonzero(~np.isfinite(x))[0])} is not finite")
+        raise ValueError(f"value {np.argwhere(~np.isfinite(x))[0].tolist()} is not finite")
     if not (np.isfinite(interval) and interval > 0):
         raise ValueError(f"the sampling interval is {interval}; it must be above zero")
     if method not in METHODS:
         raise ValueError(f"the method is {method!r}; allowed: {', '.join(METHODS)}")
-    x = x - x.mean()
+    x = x - x.mean(axis=-1, keepdims=True)
     if method == "periodogram":
         return signal.periodogram(x, 1 / interval, window=window, detrend=False)
-    segment = max(4, x.size // 8) if segment is None else segment
-    if not 4 <= segment <= x.size:
-        raise ValueError(f"a Welch segment has {segment} samples; allowed: 4 to {x.size}")
+    segment = min(max(SHORTEST_SEGMENT, samples // 8), samples) if segment is None else segment
+    if not 4 <= segment <= samples:
+        raise ValueError(f"a Welch segment has {segment} samples; allowed: 4 to {samples}")
     window = "hann" if window == "boxcar" else window
     return signal.welch(x, 1 / interval, window=window, nperseg=segment, detrend=False)
 
@@ -147,21 +159,18 @@ def phase_and_spectra(
     tables = []
     for run in runs:
         part = from_time(run, start, "step")
-        time = part["time"].values.astype(float)
-        if len(time) < 4:
-            raise ValueError(f"{len(time)} steps lie after {start} tau; a spectrum needs 4")
-        interval = (time[-1] - time[0]) / (len(time) - 1)
-        if not np.allclose(np.diff(time), interval, rtol=1e-3):
-            raise ValueError("the time steps of the series are uneven: no spectrum")
-        if "stokes_number" not in run.attrs:
-            raise ValueError("the dataset lacks the attribute 'stokes_number'")
-        stokes_number = float(run.attrs["stokes_number"])
+        interval = even_interval(part["time"])
+        stokes_number = _stokes_number(run)
         velocity, drag = (
             part[name].transpose("step", "tracked", "spatial").values[:, :, 2].astype(float)
             for name in ("tracked_velocity", "tracked_force")
         )
         case = case_of(run)
-        kept = np.unique(np.linspace(0, len(time) - 1, min(points, len(time))).round().astype(int))
+        kept = np.unique(
+            np.linspace(0, part.sizes["step"] - 1, min(points, part.sizes["step"]))
+            .round()
+            .astype(int)
+        )
         for i in range(velocity.shape[1]):
             settling = -velocity[:, i]
             head = {k: case[k] for k in ("volume_fraction", "n")} | {"particle": i + 1}
@@ -186,3 +195,83 @@ def phase_and_spectra(
     table = pd.concat(tables, ignore_index=True)
     columns = ["panel", "volume_fraction", "n", "particle", "x", "y", "slope", "slope_error"]
     return table.reindex(columns=columns)
+
+
+def cloud_spectra(
+    trajectories: list[xr.Dataset], start: float, fit_frequencies=(0.0, np.inf), progress=None
+) -> pd.DataFrame:
+    """Tabulate the energy spectrum of the settling velocity, averaged over all particles.
+
+    Parameters: `trajectories` (velocities (frame, atom, spatial) [v_s], coordinates, cell_lengths;
+    attribute stokes_number), `start` and `fit_frequencies` as in `phase_and_spectra`, `progress`.
+    kappa = 2 pi f / mean v with the mean over the cloud. The spectrum comes by both methods: the
+    plain periodogram of the paper, and Welch's with its Hann window.
+
+    The slope's 95 % interval is a jackknife: the cloud is cut into ten slabs by where particles
+    were at `start`, so that neighbours stay together, and each slab is left out in turn.
+
+    Returns the columns method, panel ("spectrum" or "fit"), volume_fraction, n, x = kappa [1/d_p],
+    y = E [v_s^2 d_p], slope, slope_low, slope_high. A case whose particles all keep their velocity
+    has no rows.
+
+    Raises ValueError for no trajectory, uneven frames or fewer than four after `start`.
+    """
+    tables = []
+    for done, trajectory in enumerate(trajectories, start=1):
+        velocity, interval = settling_velocities(trajectory, start)
+        if np.ptp(velocity, axis=0).max() > 1e-6 * abs(velocity.mean()):
+            speed = velocity.mean() * _stokes_number(trajectory)
+            slab = _slabs(trajectory, start)
+            case = case_of(trajectory)
+            head = {k: case[k] for k in ("volume_fraction", "n")}
+            for method in METHODS:
+                frequency, density = power_spectral_density(velocity.T, interval, method=method)
+                kappa = 2 * np.pi * frequency[1:] / speed
+                energy = density[:, 1:] * speed / (2 * np.pi)
+                highest = min(fit_frequencies[1], 0.25 / interval)
+                limits = 2 * np.pi * np.array([fit_frequencies[0], highest]) / speed
+                found = {"method": method} | head
+                tables.append(_with_slope(kappa, energy, slab, limits).assign(**found))
+        if progress:
+            progress(done, len(trajectories))
+    if not tables:
+        raise ValueError("there is no trajectory whose particles change their velocity")
+    table = pd.concat(tables, ignore_index=True)
+    columns = ["method", "panel", "volume_fraction", "n", "x", "y"]
+    return table[[*columns, "slope", "slope_low", "slope_high"]]
+
+
+def _with_slope(kappa, energy, slab, limits) -> pd.DataFrame:
+    """Mean spectrum of particles (n, kappa), its fitted line and the slope with its interval."""
+    totals = np.array([energy[slab == s].sum(axis=0) for s in range(SLABS)])
+    counts = np.bincount(slab, minlength=SLABS)
+    mean = totals.sum(axis=0) / len(energy)
+    ordinates = np.full(kappa.size, len(energy))
+    law = spectral_slope(kappa, mean, ordinates, limits)
+    without = [
+        spectral_slope(kappa, (len(energy) * mean - t) / (len(energy) - c), ordinates, limits).slope
+        for t, c in zip(totals, counts, strict=True)
+    ]
+    error = np.sqrt((SLABS - 1) * np.var(without))
+    half = stats.t.ppf(0.975, SLABS - 1) * error
+    ends = np.clip(limits, kappa[0], kappa[-1])
+    table = pd.concat(
+        [
+            pd.DataFrame({"panel": "spectrum", "x": kappa, "y": mean}),
+            pd.DataFrame({"panel": "fit", "x": ends, "y": law(ends)}),
+        ]
+    )
+    return table.assign(slope=law.slope, slope_low=law.slope - half, slope_high=law.slope + half)
+
+
+def _slabs(trajectory, start):
+    """Which of ten slabs of equal width each particle is in at the start of the statistics."""
+    first = from_time(trajectory, start, "frame").isel(frame=0)
+    place = first["coordinates"][:, 0].values / float(first["cell_lengths"][0])
+    return np.minimum((SLABS * (place - np.floor(place))).astype(int), SLABS - 1)
+
+
+def _stokes_number(run: xr.Dataset) -> float:
+    if "stokes_number" not in run.attrs:
+        raise ValueError("the dataset lacks the attribute 'stokes_number'")
+    return float(run.attrs["stokes_number"])

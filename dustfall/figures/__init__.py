@@ -1,5 +1,6 @@
 """One function a figure, from the tidy table that is saved beside it to a matplotlib Figure."""
 
+from dustfall.figures.fluctuations import cloud_spectra, ergodicity
 from dustfall.figures.forces import force_pdf, force_scatter, predicted_vs_target, spearman
 from dustfall.figures.frozen_cloud import frozen_cloud
 from dustfall.figures.mesh import mesh_study
@@ -13,6 +14,8 @@ from dustfall.figures.style import save
 from dustfall.figures.voronoi import voronoi_pdf, voronoi_variance
 
 __all__ = [
+    "cloud_spectra",
+    "ergodicity",
     "force_pdf",
     "force_scatter",
     "frozen_cloud",

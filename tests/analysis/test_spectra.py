@@ -1,12 +1,14 @@
 """Spectra: Parseval, known slopes, wavenumbers, and the leakage of a plain periodogram."""
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 from scipy import signal
 
 from dustfall.analysis.spectra import (
     averaged_in_bins,
+    cloud_spectra,
     energy_spectrum,
     phase_and_spectra,
     power_spectral_density,
@@ -142,6 +144,55 @@ def test_table_holds_phase_spectrum_and_fit_of_every_particle_that_moves():
     fit = table[(table["panel"] == "fit") & (table["particle"] == 1)]
     ends = np.log(fit["y"].to_numpy()), np.log(fit["x"].to_numpy())
     assert np.diff(ends[0]) / np.diff(ends[1]) == pytest.approx(fit["slope"].iloc[0])
+
+
+def cloud(velocity, interval=0.2):
+    """A trajectory of particles that settle with the given velocities (frames, n)."""
+    frames, n = velocity.shape
+    vectors = np.zeros((frames, n, 3))
+    vectors[:, :, 2] = -velocity
+    position = np.random.default_rng(n).uniform(0, 10, (n, 3)) + np.zeros((frames, 1, 1))
+    run = tracked_run(np.ones((frames, 3)), interval)
+    dims = ("frame", "atom", "spatial")
+    return xr.Dataset(
+        {
+            "time": ("frame", run["time"].values),
+            "velocities": (dims, vectors),
+            "coordinates": (dims, position),
+            "cell_lengths": (("frame", "cell_spatial"), np.full((frames, 3), 10.0)),
+        },
+        attrs=run.attrs | {"n": n},
+    )
+
+
+def test_the_cloud_has_the_mean_of_its_particles_spectra_and_parseval_holds():
+    velocity = np.random.default_rng(3).normal(1.4, 0.1, (41, 30))
+    table = cloud_spectra([cloud(velocity)], 0.0)
+    plain = table[(table["method"] == "periodogram") & (table["panel"] == "spectrum")]
+    kappa = plain["x"].to_numpy()
+    assert plain["y"].sum() * kappa[0] == pytest.approx(velocity.var(axis=0).mean(), rel=1e-12)
+    assert kappa[0] == pytest.approx(2 * np.pi / (41 * 0.2) / (velocity.mean() * 9.0))
+
+
+def test_the_jackknife_interval_of_the_slope_holds_that_of_many_clouds():
+    rows = []
+    for seed in range(20):
+        velocity = np.stack(
+            [ornstein_uhlenbeck(512, 0.02, 1.0, 100 * seed + i) for i in range(40)], axis=1
+        )
+        table = cloud_spectra([cloud(velocity + 30, 0.02)], 0.0, (1.0, 5.0))
+        rows.append(table[(table["method"] == "periodogram") & (table["panel"] == "fit")].iloc[0])
+    fits = pd.DataFrame(rows)
+    assert fits["slope"].mean() == pytest.approx(-2, abs=0.06)
+    held = fits["slope_low"] < fits["slope"].mean()
+    held &= fits["slope"].mean() < fits["slope_high"]
+    assert held.sum() >= 16
+    assert (fits["slope_high"] - fits["slope_low"]).mean() < 0.3
+
+
+def test_a_cloud_that_never_changes_has_no_spectrum():
+    with pytest.raises(ValueError, match="no trajectory whose particles change"):
+        cloud_spectra([cloud(np.ones((20, 30)))], 0.0)
 
 
 def test_bad_series_are_refused():

@@ -171,6 +171,27 @@ def frozen_cloud():
     return pd.concat(tables, ignore_index=True)
 
 
+def cloud_spectra():
+    t = np.linspace(0.01, 1, 20)
+    tables = []
+    for method in ("periodogram", "welch"):
+        for phi in PHI:
+            head = {"method": method, "volume_fraction": phi, "n": 1000}
+            found = {"slope": -2.0, "slope_low": -2.1, "slope_high": -1.9}
+            for panel in ("spectrum", "fit"):
+                tables.append(
+                    pd.DataFrame(head | {"panel": panel, "x": t, "y": phi / t**2} | found)
+                )
+    return pd.concat(tables, ignore_index=True)
+
+
+def ergodicity():
+    window = 2.0 ** np.arange(6)
+    head = {"model": "idnn", "n": 1000, "window": window}
+    tables = [pd.DataFrame(head | {"volume_fraction": p, "spread": window**-p}) for p in PHI]
+    return pd.concat(tables, ignore_index=True)
+
+
 def mesh_study():
     nodes = np.array([50, 100, 200])
     study = [
@@ -190,6 +211,8 @@ TABLES = {
         inverse_beta,
         settling_in_time,
         phase_and_spectra,
+        cloud_spectra,
+        ergodicity,
         trajectories,
         frozen_cloud,
         voronoi_pdf,
@@ -218,6 +241,8 @@ XY = {
     "predicted_vs_target": ("target", "predicted"),
     "inverse_beta": ("volume_fraction", "value"),
     "phase_and_spectra": ("x", "y"),
+    "cloud_spectra": ("x", "y"),
+    "ergodicity": ("window", "spread"),
     "voronoi_pdf": ("volume", "density"),
     "voronoi_variance": ("inverse_beta", "variance"),
     "mesh_study": ("nodes", "force"),
@@ -323,6 +348,8 @@ def test_empty_tables_and_missing_columns_are_refused(name):
         "force_pdf",
         "settling_in_time",
         "phase_and_spectra",
+        "cloud_spectra",
+        "ergodicity",
         "trajectories",
         "frozen_cloud",
         "voronoi_pdf",
@@ -348,7 +375,7 @@ def test_tables_of_several_cases_are_refused_where_one_is_drawn():
         figures.settling_in_time(
             pd.concat([settling_in_time(), settling_in_time().assign(model="dense")])
         )
-    for name in ("trajectories", "phase_and_spectra"):
+    for name in ("trajectories", "phase_and_spectra", "cloud_spectra", "ergodicity"):
         with pytest.raises(ValueError, match="one n"):
             getattr(figures, name)(pd.concat([TABLES[name](), TABLES[name]().assign(n=33000)]))
     with pytest.raises(ValueError, match="'simulation'"):

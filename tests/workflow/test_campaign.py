@@ -11,8 +11,20 @@ SMOKE = ("--configfile", "config/smoke.yaml")
 SHARDS = {"scenes": 3, "meshes": 3, "stokes": 3}
 DATA_FIGURES = {"figure_force_scatter": 1, "figure_force_pdf": 1, "figure_spearman": 1}
 MODELS = {"sweep": 4, "winner": 1, "model": 3, "evaluation": 1, "figure_predicted_vs_target": 1}
-STEADY_TABLE = {"steady_state": 1, "figure_inverse_beta": 1, "figure_voronoi_variance": 1}
-STEADY = {"figure_phase_and_spectra": 1, "figure_voronoi_pdf": 1, **STEADY_TABLE}
+STEADY_TABLE = {
+    "steady_state": 1,
+    "independence_of_n": 1,
+    "figure_inverse_beta": 1,
+    "figure_voronoi_variance": 1,
+}
+SPECTRA = {"figure_phase_and_spectra": 1, "figure_cloud_spectra": 1}
+STEADY = {
+    "neighbour_changes": 1,
+    "figure_ergodicity": 1,
+    "figure_voronoi_pdf": 1,
+    **SPECTRA,
+    **STEADY_TABLE,
+}
 SETTLING = {
     "sedimentation": 7,
     "figure_settling_in_time": 1,
@@ -25,7 +37,7 @@ FROM_DATA = {"dataset": 1, **DATA_FIGURES, **MODELS, **SETTLING}
 def test_every_figure_is_there_with_its_numbers(campaign):
     folder = campaign.folder / "results/figures"
     pictures = sorted(folder.glob("*.png"))
-    assert len(pictures) == 12
+    assert len(pictures) == 14
     for picture in pictures:
         assert picture.read_bytes().startswith(b"\x89PNG")
         assert picture.with_suffix(".pdf").read_bytes().startswith(b"%PDF")
@@ -71,11 +83,13 @@ def test_bits_of_the_data_hang_neither_on_cores_nor_on_shard_size(campaign, tmp_
         ("sedimentation={step: 0.05}", SETTLING),
         (
             "sedimentation={galileo: {multiples: [1, 2, 3]}}",
-            {"sedimentation": 1} | STEADY_TABLE | {"figure_voronoi_pdf": 1},
+            {"sedimentation": 1, "neighbour_changes": 1} | STEADY_TABLE | {"figure_voronoi_pdf": 1},
         ),
         ("sedimentation={statistics_from: 5}", STEADY),
         ("figures={samples: 500}", {"figure_force_scatter": 1, "figure_predicted_vs_target": 1}),
         ("figures={spectrum: welch}", {"figure_phase_and_spectra": 1}),
+        ("figures={fit_frequencies: [0, 2]}", SPECTRA),
+        ("figures={frozen_cloud: {clouds: 3}}", {"figure_frozen_cloud": 1}),
     ],
 )
 def test_an_edited_key_reruns_what_hangs_on_it_and_nothing_else(campaign, setting, expected):

@@ -15,6 +15,8 @@ FIGURES = [
     "phase_and_spectra",
     "voronoi_pdf",
     "voronoi_variance",
+    "cloud_spectra",
+    "ergodicity",
     "trajectories",
     "frozen_cloud",
     "mesh_study",
@@ -40,6 +42,8 @@ def test_the_paper_takes_the_expected_jobs_and_fewer_than_a_thousand(project):
         # 3 numbers of particles, 6 volume fractions, and 2 more Galileo numbers
         "sedimentation": 3 * 6 + 2,
         "steady_state": 1,
+        "independence_of_n": 1,
+        "neighbour_changes": 1,
         "mesh_study": 1,
         **{f"figure_{name}": 1 for name in FIGURES},
     }

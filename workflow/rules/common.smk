@@ -62,6 +62,8 @@ FIGURES = expand(
         "phase_and_spectra",
         "voronoi_pdf",
         "voronoi_variance",
+        "cloud_spectra",
+        "ergodicity",
         "trajectories",
         "frozen_cloud",
         "mesh_study",

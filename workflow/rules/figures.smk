@@ -17,6 +17,42 @@ rule steady_state:
         "../scripts/steady_state.py"
 
 
+rule independence_of_n:
+    """Test whether the averages hang on the number of particles."""
+    input:
+        steady="results/analysis/steady_state.csv",
+        library=library("independence_of_n.py"),
+    output:
+        report(
+            "results/analysis/independence_of_n.csv",
+            category="Sedimentation",
+            caption="../report/independence_of_n.rst",
+        ),
+    log:
+        "logs/analysis/independence_of_n.log",
+    script:
+        "../scripts/independence_of_n.py"
+
+
+rule neighbour_changes:
+    """Count how often the five nearest neighbours change."""
+    input:
+        series=expand("results/sedimentation/{case}.series.nc", case=CASES),
+        library=library("neighbour_changes.py"),
+    output:
+        report(
+            "results/analysis/neighbour_changes.csv",
+            category="Sedimentation",
+            caption="../report/neighbour_changes.rst",
+        ),
+    log:
+        "logs/analysis/neighbour_changes.log",
+    params:
+        statistics_from=config["sedimentation"]["statistics_from"],
+    script:
+        "../scripts/neighbour_changes.py"
+
+
 rule figure_force_scatter:
     """Force components against volume fraction."""
     input:
@@ -124,6 +160,37 @@ rule figure_phase_and_spectra:
         spectrum=config["figures"]["spectrum"],
     script:
         "../scripts/figure_phase_and_spectra.py"
+
+
+rule figure_cloud_spectra:
+    """Energy spectra averaged over all particles, with and without a window."""
+    input:
+        trajectories=expand("results/sedimentation/{case}.nc", case=LARGEST_CASES),
+        library=library("figure_cloud_spectra.py"),
+    output:
+        **figure("cloud_spectra", "Sedimentation"),
+    log:
+        "logs/figures/cloud_spectra.log",
+    params:
+        statistics_from=config["sedimentation"]["statistics_from"],
+        fit_frequencies=config["figures"]["fit_frequencies"],
+    script:
+        "../scripts/figure_cloud_spectra.py"
+
+
+rule figure_ergodicity:
+    """Time average against ensemble average of the settling velocity."""
+    input:
+        trajectories=expand("results/sedimentation/{case}.nc", case=LARGEST_CASES),
+        library=library("figure_ergodicity.py"),
+    output:
+        **figure("ergodicity", "Sedimentation"),
+    log:
+        "logs/figures/ergodicity.log",
+    params:
+        statistics_from=config["sedimentation"]["statistics_from"],
+    script:
+        "../scripts/figure_ergodicity.py"
 
 
 rule figure_trajectories:

@@ -1,0 +1,52 @@
+"""How often the five nearest neighbours change."""
+
+from collections.abc import Iterable
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from dustfall.analysis.settling import CASE, case_of, from_time, mean_with_interval
+
+
+def neighbour_changes(runs: Iterable[xr.Dataset], start: float) -> pd.DataFrame:
+    """Tabulate the share of particles that get a new neighbour in a step, from `start` [tau] on.
+
+    Parameters: `runs`, series datasets with new_neighbours (step), the share of particles whose set
+    of five is another than a step ago, and only_fifth (step), the share of these in which only the
+    farthest changed (NaN in the table where a series lacks it); attribute step [tau].
+
+    Returns the columns model, n, volume_fraction, galileo, step, share, low, high (95 % interval,
+    batch means), per_tau = share / step, and only_fifth, the share of all changes; sorted. Runs of
+    one case are averaged, with the mean of their intervals' half-widths over the root of their
+    number.
+    """
+    rows = []
+    for run in runs:
+        part = from_time(run, start, "step")
+        mean = mean_with_interval(part["new_neighbours"].values)
+        changes = part["new_neighbours"].values
+        only = np.nan
+        if changes.any() and "only_fifth" in part:
+            only = np.sum(changes * np.nan_to_num(part["only_fifth"].values)) / np.sum(changes)
+        rows.append(
+            case_of(run)
+            | {
+                "step": float(run.attrs["step"]),
+                "share": mean.value,
+                "half_width": mean.half_width,
+                "only_fifth": only,
+            }
+        )
+    if not rows:
+        raise ValueError("there are no runs: at least one series is needed")
+    cases = pd.DataFrame(rows).groupby([*CASE, "step"])
+    table = cases.agg(
+        share=("share", "mean"),
+        half_width=("half_width", lambda h: h.mean() / np.sqrt(len(h))),
+        only_fifth=("only_fifth", "mean"),
+    ).reset_index()
+    table["low"] = table["share"] - table["half_width"]
+    table["high"] = table["share"] + table["half_width"]
+    table["per_tau"] = table["share"] / table["step"]
+    return table[[*CASE, "step", "share", "low", "high", "per_tau", "only_fifth"]]

@@ -1,0 +1,13 @@
+"""Test whether the steady-state averages hang on the number of particles."""
+
+import pandas as pd
+
+import joblog
+from dustfall.analysis.independence import independence_of_n
+from dustfall.files import atomic
+
+joblog.start(snakemake.log[0])
+
+steady = pd.read_csv(snakemake.input.steady, float_precision="round_trip")
+with atomic(snakemake.output[0]) as path:
+    independence_of_n(steady).to_csv(path, index=False)
