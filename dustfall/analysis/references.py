@@ -43,6 +43,16 @@ to 4 times at phi of about 1e-3 (Del Bello et al. 2017, doi:10.1038/srep39620, a
 POISSON_VORONOI_VARIANCE = 0.179032
 """Variance of V/mean(V) of the Voronoï cells of random points (integral of Gilbert 1962)."""
 
+PAPER_VORONOI_VARIANCE = pd.DataFrame(
+    {
+        "volume_fraction": [1e-3, 1e-4, 1e-5, 1e-6],
+        "inverse_beta": [1.39, 1.1835, 1.0826, 1.01],
+        "variance": [1.2381, 1.04, 0.97, 0.97],
+    }
+)
+"""Variance of V/mean(V) over k theta^2 = 0.2 against 1/beta (paper, figure of the Voronoï variance,
+read from the arrows that point at its data; the last stands for all below 1e-6)."""
+
 PAPER_GAMMA = (5.0, 0.2)
 """Shape k and scale theta of the gamma law of the paper; k = (3 d + 1)/2 in d = 3 dimensions
 (Ferenc & Néda 2007). Its variance, k theta^2 = 0.2, is larger than that of random points."""

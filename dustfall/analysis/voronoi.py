@@ -11,9 +11,11 @@ from scipy import stats
 from dustfall.analysis.references import (
     MATCHED_GAMMA,
     PAPER_GAMMA,
+    PAPER_VORONOI_VARIANCE,
     POISSON_VORONOI_VARIANCE,
 )
-from dustfall.analysis.settling import case_of, correlation_length, from_time
+from dustfall.analysis.settling import CASE, case_of, correlation_length
+from dustfall.sedimentation.start import cube_side, random_positions
 
 VOLUME_EDGES = np.linspace(0, 4, 41)
 """Bins of V/mean(V); of a Poisson process fewer than one cell in 10^5 is larger."""
@@ -24,6 +26,9 @@ TOUCHING_CELLS = 1.3
 """Cells that touch are correlated: the variance of V/mean(V) of random points spreads between
 realisations 1.2 to 1.4 times as much as that of independent cells (measured with 300, 1,000 and
 3,000 points); the bins of the p.d.f. do not."""
+
+REFERENCE_CLOUDS = 10
+"""Random clouds that the reference of each volume fraction is averaged over."""
 
 
 def voronoi_volumes(positions, cell_lengths) -> np.ndarray:
@@ -82,6 +87,35 @@ def snapshot_volumes(
         if progress:
             progress(done, frames.size)
     return np.array(volumes)
+
+
+def pooled_volumes(trajectories, start: float, snapshots=50, progress=None) -> np.ndarray:
+    """Normalised volumes (k, n times runs) of runs of one case that differ by their seed."""
+    volumes = [
+        snapshot_volumes(t, start, snapshots=snapshots, progress=progress) for t in trajectories
+    ]
+    shortest = min(map(len, volumes))
+    return np.concatenate([v[-shortest:] for v in volumes], axis=1)
+
+
+def random_sphere_variance(
+    volume_fraction: float, particles: int, seed: int, clouds=REFERENCE_CLOUDS
+) -> dict[str, float]:
+    """Variance of normalised volumes among random spheres that do not overlap.
+
+    Parameters: `volume_fraction`, `particles` of a cloud, `seed`, `clouds` (at least two), placed
+    one after the other at random (`sedimentation.start`). Returns value, low and high of the 95 %
+    interval, Student's t between clouds.
+    """
+    found = []
+    for cloud in range(clouds):
+        rng = np.random.default_rng([seed, cloud])
+        positions = random_positions(rng, particles, volume_fraction)
+        volumes = voronoi_volumes(positions, cube_side(particles, volume_fraction))
+        found.append(volumes.var() / volumes.mean() ** 2)
+    half = stats.t.ppf(0.975, clouds - 1) * np.std(found, ddof=1) / np.sqrt(clouds)
+    mean = float(np.mean(found))
+    return {"value": mean, "low": mean - half, "high": mean + half}
 
 
 def gamma_pdf(volume, shape, scale) -> np.ndarray:
@@ -167,27 +201,26 @@ def voronoi_pdf_table(
 ) -> pd.DataFrame:
     """Tabulate the p.d.f. of normalised Voronoï volumes for each Galileo number.
 
-    Parameters: `trajectories` of one volume fraction, one for each Galileo number; `start` of the
-    steady state [tau]; `seed` of the bootstrap; `snapshots`, the most frames used of each.
+    Parameters: `trajectories` of one volume fraction, one or, with several seeds, more for each
+    Galileo number; `start` of the steady state [tau]; `seed` of the bootstrap; `snapshots`, the
+    most frames used of each.
 
     Returns the columns source, galileo_multiple, volume, density, low, high. Sources: "steady
-    state" (one curve a Galileo number, as a multiple of the lowest), "random start" (first frame
-    of the first trajectory), "gamma, k = 5, theta = 0.2" and "gamma, k = 5.59".
+    state" (one curve a Galileo number, as a multiple of the lowest), "random start" (first frames
+    at the lowest), "gamma, k = 5, theta = 0.2" and "gamma, k = 5.59".
 
     Raises ValueError where there is no trajectory, no frame after `start` or an attribute missing.
     """
-    trajectories = sorted(trajectories, key=lambda t: case_of(t)["galileo"])
-    if not trajectories:
-        raise ValueError("there are no trajectories: at least one is needed")
-    lowest = case_of(trajectories[0])["galileo"]
-    initial = snapshot_volumes(trajectories[0].isel(frame=[0]))
-    tables = [volume_distribution(initial, seed).assign(source="random start")]
-    for trajectory in trajectories:
-        volumes = snapshot_volumes(trajectory, start, snapshots=snapshots, progress=progress)
-        multiple = case_of(trajectory)["galileo"] / lowest
+    by_galileo = {case[-1]: runs for case, runs in sorted(_cases(trajectories).items())}
+    lowest = min(by_galileo)
+    first = [trajectory.isel(frame=[0]) for trajectory in by_galileo[lowest]]
+    initial = volume_distribution(pooled_volumes(first, 0.0), seed)
+    tables = [initial.assign(source="random start")]
+    for galileo, runs in by_galileo.items():
+        volumes = pooled_volumes(runs, start, snapshots, progress)
         tables.append(
             volume_distribution(volumes, seed).assign(
-                source="steady state", galileo_multiple=round(multiple, 6)
+                source="steady state", galileo_multiple=round(galileo / lowest, 6)
             )
         )
     x = np.linspace(0, VOLUME_EDGES[-1], 401)[1:]
@@ -201,59 +234,71 @@ def voronoi_pdf_table(
     return table[["source", "galileo_multiple", "volume", "density", "low", "high"]]
 
 
+def _cases(trajectories) -> dict[tuple, list]:
+    """Trajectories by case: those of one case differ by their seed."""
+    cases: dict[tuple, list] = {}
+    for trajectory in trajectories:
+        cases.setdefault(tuple(case_of(trajectory).values()), []).append(trajectory)
+    if not cases:
+        raise ValueError("there are no trajectories: at least one is needed")
+    return cases
+
+
 def voronoi_variance_table(
     trajectories: Iterable[xr.Dataset],
     steady: pd.DataFrame,
     start: float,
     seed: int,
     snapshots=50,
+    reference_particles=10_000,
     progress=None,
 ) -> pd.DataFrame:
     """Tabulate the variance of normalised Voronoï volumes against the steady settling velocity.
 
     Parameters: `trajectories`, `steady` as `steady_state` returns it for the same cases, `start`
-    of the steady state [tau], `seed` of the bootstrap, `snapshots`, the most frames used of each.
+    of the steady state [tau], `seed` of the bootstrap and of the reference, `snapshots`, the most
+    frames used of each, `reference_particles` of a cloud of random spheres.
 
     Returns the columns source, model, n, volume_fraction, galileo, variance, low, high (all over
-    k theta^2 = 0.2 of the paper's gamma law), inverse_beta, inverse_beta_low, inverse_beta_high,
-    and poisson, the same ratio of random points. Sources: "steady state", and "random start", the
-    first frame: spheres without overlap at the same phi.
+    k theta^2 = 0.2 of the paper's gamma law), inverse_beta, inverse_beta_low, inverse_beta_high.
+    Sources: "steady state"; "random spheres" without overlap at the same phi, at the velocity of
+    that phi's case with most particles; "random points", at each phi as well; and "paper".
 
     Raises ValueError where there is no trajectory or `steady` lacks its case.
     """
     shape, scale = PAPER_GAMMA
+    unit = shape * scale**2
     rows = []
-    for trajectory in trajectories:
-        case = case_of(trajectory)
+    for key, runs in sorted(_cases(trajectories).items()):
+        case = dict(zip(CASE, key, strict=True))
         same = (steady[list(case)] == pd.Series(case)).all(axis=1)
         if not same.any():
             raise ValueError(f"the table of steady states has no row for {case}")
         row = steady[same].iloc[0]
-        velocity = {
-            "inverse_beta": row["value"],
-            "inverse_beta_low": row["low"],
-            "inverse_beta_high": row["high"],
-        }
-        volumes = {
-            "steady state": snapshot_volumes(
-                from_time(trajectory, start, "frame"), snapshots=snapshots, progress=progress
-            ),
-            "random start": snapshot_volumes(trajectory.isel(frame=[0])),
-        }
-        for source, v in volumes.items():
-            found = volume_variance(v, seed)
-            rows.append(
-                {"source": source}
-                | case
-                | {
-                    "variance": found["value"] / (shape * scale**2),
-                    "low": found["low"] / (shape * scale**2),
-                    "high": found["high"] / (shape * scale**2),
-                }
-                | velocity
-                | {"poisson": POISSON_VORONOI_VARIANCE / (shape * scale**2)}
-            )
-    if not rows:
-        raise ValueError("there are no trajectories: at least one is needed")
-    table = pd.DataFrame(rows)
+        found = volume_variance(pooled_volumes(runs, start, snapshots, progress), seed)
+        rows.append(
+            {"source": "steady state"}
+            | case
+            | _over(unit, found)
+            | {
+                "inverse_beta": row["value"],
+                "inverse_beta_low": row["low"],
+                "inverse_beta_high": row["high"],
+            }
+        )
+    steady_rows = pd.DataFrame(rows).sort_values(["galileo", "n"], ascending=[False, True])
+    for phi, largest in steady_rows.groupby("volume_fraction").last().iterrows():
+        head = {"volume_fraction": phi, "inverse_beta": largest["inverse_beta"]}
+        found = random_sphere_variance(phi, reference_particles, seed)
+        spheres = {"source": "random spheres", "n": reference_particles}
+        rows.append(head | spheres | _over(unit, found))
+        points = {"source": "random points", "variance": POISSON_VORONOI_VARIANCE / unit}
+        rows.append(head | points)
+    table = pd.concat([pd.DataFrame(rows), PAPER_VORONOI_VARIANCE.assign(source="paper")])
     return table.sort_values(["source", "n", "volume_fraction", "galileo"], ignore_index=True)
+
+
+def _over(unit, found) -> dict[str, float]:
+    """The columns of a variance and its interval in another unit."""
+    names = {"value": "variance", "low": "low", "high": "high"}
+    return {name: found[key] / unit for key, name in names.items()}

@@ -67,42 +67,54 @@ def voronoi_variance(frame: pd.DataFrame) -> Figure:
     """Variance of normalised Voronoï volumes against settling velocity, by volume fraction.
 
     `frame`: source, n, volume_fraction, galileo, variance, low, high, inverse_beta,
-    inverse_beta_low, inverse_beta_high, poisson, as `analysis.voronoi.voronoi_variance_table`
-    gives. Hollow: the random start of the same case. Raises ValueError for a missing column or an
-    empty table.
+    inverse_beta_low, inverse_beta_high, as `analysis.voronoi.voronoi_variance_table` gives.
+    Hollow: random spheres at the same phi. Raises ValueError for a missing column or an empty
+    table.
     """
     columns = ["source", "n", "volume_fraction", "variance", "low", "high"]
     speed = ["inverse_beta", "inverse_beta_low", "inverse_beta_high"]
-    require(frame, [*columns, *speed, "poisson"], "voronoi_variance")
+    require(frame, [*columns, *speed], "voronoi_variance")
     figure = new_figure(1.4 * SINGLE, 3.5)
     ax = figure.subplots()
-    numbers = sorted(frame["n"].unique())
-    for row in frame.itertuples():
-        steady = row.source == "steady state"
-        vertical = np.nan_to_num([[row.variance - row.low], [row.high - row.variance]])
-        sideways = np.nan_to_num(
-            [
-                [row.inverse_beta - row.inverse_beta_low],
-                [row.inverse_beta_high - row.inverse_beta],
-            ]
-        )
-        colour = phi_colour(row.volume_fraction)
+    ours = frame[frame["source"] == "steady state"]
+    numbers = sorted(ours["n"].unique())
+    for row in ours.itertuples():
         ax.errorbar(
             row.inverse_beta,
             row.variance,
-            yerr=vertical if steady else None,
-            xerr=sideways if steady else None,
-            color=colour,
-            mfc=colour if steady else "none",
+            yerr=np.nan_to_num([[row.variance - row.low], [row.high - row.variance]]),
+            xerr=np.nan_to_num(
+                [
+                    [row.inverse_beta - row.inverse_beta_low],
+                    [row.inverse_beta_high - row.inverse_beta],
+                ]
+            ),
+            color=phi_colour(row.volume_fraction),
             marker=MARKERS[numbers.index(row.n) % len(MARKERS)],
-            ms=5 if steady else 4,
+            ms=5,
             elinewidth=0.8,
             capsize=2,
             ls="none",
-            zorder=3 if steady else 2,
+            zorder=3,
         )
-    poisson = frame["poisson"].iloc[0]
-    ax.axhline(poisson, color=REFERENCE, lw=0.8, ls="--", zorder=0)
+    spheres = frame[frame["source"] == "random spheres"]
+    for row in spheres.itertuples():
+        ax.errorbar(
+            row.inverse_beta,
+            row.variance,
+            yerr=[[row.variance - row.low], [row.high - row.variance]],
+            color=phi_colour(row.volume_fraction),
+            marker="o",
+            mfc="white",
+            ms=4,
+            elinewidth=0.8,
+            ls="none",
+            zorder=4,
+        )
+    points = frame[frame["source"] == "random points"].sort_values("inverse_beta")
+    ax.plot(points["inverse_beta"], points["variance"], color=REFERENCE, lw=0.8, ls="--", zorder=0)
+    paper = frame[frame["source"] == "paper"]
+    ax.plot(paper["inverse_beta"], paper["variance"], ls="none", marker="*", ms=8, color="k")
     ax.set_xlabel(r"settling velocity $\langle v_s\rangle / v_{s,\mathrm{Stokes}} = 1/\beta$")
     ax.set_ylabel(r"$\mathrm{var}(V\,/\,\overline{V}) \;/\; (k\theta^2)$")
     handles = [
@@ -116,10 +128,11 @@ def voronoi_variance(frame: pd.DataFrame) -> Figure:
         )
         for i, n in enumerate(numbers)
     ]
-    handles.append(
-        Line2D([], [], color="k", ls="none", marker="o", mfc="none", label="random start")
-    )
-    handles.append(Line2D([], [], color=REFERENCE, lw=0.8, ls="--", label="random points"))
-    figure.legend(handles=handles, loc="outside right center")
-    phi_legend(figure, frame["volume_fraction"])
+    handles += [
+        Line2D([], [], color="k", ls="none", marker="*", ms=8, label="paper"),
+        Line2D([], [], color="k", ls="none", marker="o", mfc="none", label="random spheres"),
+        Line2D([], [], color=REFERENCE, lw=0.8, ls="--", label="random points"),
+    ]
+    ax.legend(handles=handles, loc="upper left")
+    phi_legend(figure, ours["volume_fraction"])
     return figure

@@ -13,6 +13,8 @@ from dustfall.analysis.settling import CASE
 from dustfall.analysis.voronoi import (
     block_bootstrap,
     gamma_pdf,
+    pooled_volumes,
+    random_sphere_variance,
     snapshot_volumes,
     volume_distribution,
     volume_variance,
@@ -26,8 +28,8 @@ def random_points(n, side=1.0, seed=1):
     return np.random.default_rng([seed, n]).uniform(0, side, (n, 3))
 
 
-def trajectory(galileo=0.078, frames=6, n=60, side=10.0, drift=500.0):
-    rng = np.random.default_rng([frames, n])
+def trajectory(galileo=0.078, frames=6, n=60, side=10.0, drift=500.0, seed=1):
+    rng = np.random.default_rng([seed, frames, n])
     start = rng.uniform(0, side, (n, 3))
     steps = rng.normal(size=(frames, n, 3)) - [0, 0, drift]
     return xr.Dataset(
@@ -36,7 +38,7 @@ def trajectory(galileo=0.078, frames=6, n=60, side=10.0, drift=500.0):
             "coordinates": (("frame", "atom", "spatial"), start + np.cumsum(steps, axis=0)),
             "cell_lengths": (("frame", "cell_spatial"), np.full((frames, 3), side)),
         },
-        attrs={"model": "idnn", "n": n, "volume_fraction": 1e-3, "galileo": galileo, "seed": 1},
+        attrs={"model": "idnn", "n": n, "volume_fraction": 1e-3, "galileo": galileo, "seed": seed},
     )
 
 
@@ -139,14 +141,39 @@ def test_pdf_table_names_galileo_numbers_as_multiples_of_the_lowest():
 def test_variance_table_stands_beside_the_settling_velocity_of_the_same_case():
     case = dict(zip(CASE, ("idnn", 60, 1e-3, 0.078), strict=True))
     steady = pd.DataFrame([case | {"value": 1.4, "low": 1.3, "high": 1.5}])
-    table = voronoi_variance_table([trajectory()], steady, 50.0, seed=1)
-    assert table["source"].tolist() == ["random start", "steady state"]
-    assert (table["inverse_beta"] == 1.4).all()
-    assert table["poisson"].iloc[0] == pytest.approx(0.89516)
-    first = snapshot_volumes(trajectory().isel(frame=[0]))
-    assert table["variance"].iloc[0] == pytest.approx(first.var() / 0.2)
+    table = voronoi_variance_table([trajectory()], steady, 50.0, 1, reference_particles=100)
+    assert set(table["source"]) == {"steady state", "random spheres", "random points", "paper"}
+    ours = table[table["source"] != "paper"].set_index("source")
+    assert (ours["inverse_beta"] == 1.4).all()
+    assert ours.loc["random points", "variance"] == pytest.approx(0.89516)
+    found = snapshot_volumes(trajectory(), 50.0).var(axis=1).mean()
+    assert ours.loc["steady state", "variance"] == pytest.approx(found / 0.2)
+    spheres = random_sphere_variance(1e-3, 100, seed=1)
+    assert ours.loc["random spheres", "high"] == pytest.approx(spheres["high"] / 0.2)
     with pytest.raises(ValueError, match="no row for"):
         voronoi_variance_table([trajectory(galileo=0.3)], steady, 50.0, seed=1)
+
+
+def test_seeds_of_a_case_are_pooled_and_narrow_the_interval():
+    one = pooled_volumes([trajectory(seed=1)], 0.0)
+    two = pooled_volumes([trajectory(seed=1), trajectory(seed=2)], 0.0)
+    assert two.shape == (6, 120)
+    np.testing.assert_array_equal(two[:, :60], one)
+    width = [v["high"] - v["low"] for v in (volume_variance(one, 1), volume_variance(two, 1))]
+    assert width[1] < width[0]
+    pdf = voronoi_pdf_table([trajectory(seed=1), trajectory(seed=2)], 50.0, seed=1)
+    assert pdf["galileo_multiple"].dropna().unique().tolist() == [1.0]
+
+
+def test_random_spheres_have_more_even_cells_the_denser_they_are():
+    dilute = random_sphere_variance(1e-7, 1500, seed=1, clouds=6)
+    assert dilute["low"] < POISSON_VORONOI_VARIANCE < dilute["high"]
+    # The same draws at each volume fraction, so that differences are sharper than the intervals.
+    variance = [
+        random_sphere_variance(phi, 1500, seed=1, clouds=3)["value"] for phi in (1e-7, 1e-3, 1e-2)
+    ]
+    assert 0.96 < variance[1] / variance[0] < 1
+    assert variance[2] < 0.95 * variance[1]
 
 
 @pytest.mark.parametrize(

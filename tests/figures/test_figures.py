@@ -147,9 +147,8 @@ def voronoi_variance():
             "inverse_beta": 1 + phi**0.2,
             "inverse_beta_low": 0.99 + phi**0.2,
             "inverse_beta_high": 1.01 + phi**0.2,
-            "poisson": 0.89516,
         }
-        for source in ("random start", "steady state")
+        for source in ("steady state", "random spheres", "random points", "paper")
         for n in (1000, 10000)
         for phi in PHI
     ]
