@@ -68,8 +68,38 @@ def _respond(degree, response, incoming, out):
 
 
 @njit(cache=True)
-def _system(moments, degrees, starts, orders, pairs, couplings, response, tables, out):
-    """out = moments + T sum_j K_ij moments_j, for moments (total, 3)."""
+def couple_scene(centres, orders, tables):
+    """Everything about a scene that the iterations need, from centres (n, 3) [radii].
+
+    orders: (n, n) symmetric degree of each pair. Returns degrees (n,) and first harmonics (n + 1,)
+    of the spheres; direction (polar angle, azimuth) and coupling of each pair j < i, row by row.
+    """
+    n = len(centres)
+    degrees = np.zeros(n, dtype=np.int64)
+    starts = np.zeros(n + 1, dtype=np.int64)
+    for i in range(n):
+        for j in range(n):
+            if j != i:
+                degrees[i] = max(degrees[i], orders[i, j])
+        starts[i + 1] = starts[i] + (degrees[i] + 1) ** 2
+    count = n * (n - 1) // 2
+    angles, p = np.empty((count, 2)), 0
+    couplings = [np.empty(0) for _ in range(count)]
+    for i in range(n):
+        for j in range(i):
+            x, y, z = centres[i] - centres[j]
+            across = np.sqrt(x * x + y * y)
+            angles[p] = np.arctan2(across, z), np.arctan2(y, x)
+            distance = np.sqrt(across**2 + z * z)
+            couplings[p] = axial_coupling(orders[i, j], distance, tables)
+            p += 1
+    return degrees, starts, angles, couplings
+
+
+@njit(cache=True)
+def apply_system(moments, scene, orders, response, tables, out):
+    """out = moments + T sum_j K_ij moments_j, for moments (total, 3) of a coupled scene."""
+    degrees, starts, angles, couplings = scene
     largest = (np.max(degrees) + 1) ** 2
     incoming = np.zeros(moments.shape)
     field, spare = np.empty((largest, 3)), np.empty((largest, 3))
@@ -78,7 +108,7 @@ def _system(moments, degrees, starts, orders, pairs, couplings, response, tables
     for i in range(len(degrees)):
         for j in range(i):
             _add_pair(
-                orders[i, j], pairs[p, 1], pairs[p, 2], couplings[p], tables,
+                orders[i, j], angles[p, 0], angles[p, 1], couplings[p], tables,
                 moments[starts[i] : starts[i + 1]], moments[starts[j] : starts[j + 1]],
                 incoming[starts[i] : starts[i + 1]], incoming[starts[j] : starts[j + 1]],
                 field, spare, lines,
@@ -99,25 +129,8 @@ def solve_scene(centres, flow, orders, response, tables, tolerance, most):
     Forces (n, 3) are in units of mu, flow and radius.
     """
     n = len(centres)
-    degrees = np.zeros(n, dtype=np.int64)
-    starts = np.zeros(n + 1, dtype=np.int64)
-    for i in range(n):
-        for j in range(n):
-            if j != i:
-                degrees[i] = max(degrees[i], orders[i, j])
-        starts[i + 1] = starts[i] + (degrees[i] + 1) ** 2
-    count = n * (n - 1) // 2
-    pairs, p = np.empty((count, 3)), 0
-    couplings = [np.empty(0) for _ in range(count)]
-    for i in range(n):
-        for j in range(i):
-            shift = centres[i] - centres[j]
-            distance = np.sqrt(np.sum(shift**2))
-            across = np.sqrt(shift[0] ** 2 + shift[1] ** 2)
-            pairs[p] = distance, np.arctan2(across, shift[2]), np.arctan2(shift[1], shift[0])
-            couplings[p] = axial_coupling(orders[i, j], distance, tables)
-            p += 1
-
+    scene = couple_scene(centres, orders, tables)
+    degrees, starts = scene[0], scene[1]
     uniform, right = np.zeros((starts[n], 3)), np.zeros((starts[n], 3))
     for i in range(n):
         uniform[starts[i]] = np.sqrt(4.0 * np.pi) * flow
@@ -134,9 +147,7 @@ def solve_scene(centres, flow, orders, response, tables, tolerance, most):
         residual = 1.0
         while iterations < most and residual > tolerance:
             k = iterations
-            _system(
-                basis[k], degrees, starts, orders, pairs, couplings, response, tables, basis[k + 1]
-            )
+            apply_system(basis[k], scene, orders, response, tables, basis[k + 1])
             for i in range(k + 1):
                 h = np.sum(basis[i] * basis[k + 1])
                 hessenberg[i, k] = h

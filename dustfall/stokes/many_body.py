@@ -11,19 +11,21 @@ from functools import cache
 import numpy as np
 from numba import njit
 
-from dustfall import STOKES_DRAG
 from dustfall.stokes.compressed import solve_scene
 from dustfall.stokes.harmonics import response_matrix, single_layer_spectrum
 from dustfall.stokes.mesh import sphere_mesh
 from dustfall.stokes.one_body import OneBody
-from dustfall.stokes.single_layer import RADIUS
+from dustfall.stokes.spheres import (
+    FORCE_UNIT,
+    RADIUS,
+    centre_distances,
+    checked_centres,
+    checked_flow,
+)
 from dustfall.stokes.translation import MOST_DEGREE, translation_tables
 
 TEMPLATE_SIZE = 0.5
 """Edge length [radii] of the template that `forces_on_fixed_spheres` uses: 154 elements."""
-
-FORCE_UNIT = STOKES_DRAG / (3.0 * np.pi)
-"""Re_p c_D for a force of one mu U d_p: an isolated sphere feels 3 pi mu U d_p."""
 
 MOST_ITERATIONS = 300
 
@@ -62,19 +64,20 @@ class Solution:
 
 
 @njit(cache=True)
-def truncation_error(order, rate):
+def truncation_error(order, excited, felt):
     """Relative error of a force that comes of leaving out harmonics above `order`.
 
-    A sphere j is excited by a sphere k and felt by a sphere i (which may be k). With cosh(xi) =
-    distance / d_p each way costs a harmonic of degree l a factor exp(-xi l), so rate = xi_ij +
-    xi_jk (for two spheres, Stimson and Jeffery 1926). The error is geometric where spheres are
-    apart; where they nearly touch it falls with the cube of the order. Constants are fitted to
-    pairs, triangles, chains, tetrahedra and six spheres with gaps from 0.001 to 3 d_p, orders from
-    0 to 32, and to random scenes.
+    A sphere j is excited by a sphere k and felt by a sphere i (which may be k); excited, felt: xi
+    of both pairs, cosh(xi) = distance / d_p. Each way costs a harmonic of degree l a factor
+    exp(-xi l) (for two spheres, Stimson and Jeffery 1926), so the error is geometric in the order
+    where spheres are apart; where they nearly touch it falls with the cube of the order. Constants
+    are fitted to pairs, triangles, chains, tetrahedra and six spheres with gaps from 0.001 to 3
+    d_p, orders from 0 to 32, and to random scenes.
     """
     terms = order + 1.0
+    rate, both = excited + felt, 2.0 * np.sqrt(excited * felt)
     apart = np.exp(np.minimum(rate * (terms + 1.0), 300.0)) / (4.0 * terms)
-    near = 1.3 * terms**3 * np.exp(0.54 * np.minimum(rate * terms, 300.0))
+    near = 2.0 * terms**3 * np.exp(0.54 * np.minimum(both * terms, 300.0))
     return 1.0 / (apart + near)
 
 
@@ -88,7 +91,7 @@ def _left_out(xi, orders):
             for k in range(n):
                 if j != i and j != k:
                     order = min(orders[i, j], orders[j, k])
-                    out[i] += truncation_error(order, xi[i, j] + xi[j, k]) ** 2
+                    out[i] += truncation_error(order, xi[j, k], xi[i, j]) ** 2
     return np.sqrt(out)
 
 
@@ -107,9 +110,9 @@ def _choose_orders(distance, tolerance, most):
         for i in range(n):
             for j in range(i):
                 # What excites the two: each other, or a third sphere that is closer to either.
-                rate = xi[i, j] + min(np.min(xi[i]), np.min(xi[j]))
+                excited = min(np.min(xi[i]), np.min(xi[j]))
                 order = orders[i, j]
-                while order < most and truncation_error(order, rate) > share:
+                while order < most and truncation_error(order, excited, xi[i, j]) > share:
                     order += 1
                 orders[i, j] = orders[j, i] = order
                 complete &= order == most
@@ -128,10 +131,10 @@ def plan_scene(centres, tolerance: float = 1e-4) -> Plan:
     Raises ValueError for a wrong shape, values that are not finite, overlaps, or a tolerance
     outside [1e-8, 0.1].
     """
-    centres = _checked_centres(centres)
+    centres = checked_centres(centres)
     if not 1e-8 <= tolerance <= 0.1:
         raise ValueError(f"tolerance {tolerance}: allowed are 1e-8 to 0.1")
-    return Plan(centres, *_choose_orders(_distances(centres), tolerance, MOST_DEGREE))
+    return Plan(centres, *_choose_orders(centre_distances(centres), tolerance, MOST_DEGREE))
 
 
 @dataclass(frozen=True)
@@ -152,8 +155,8 @@ class Response:
 
         A degree n matters as much as it would be missed.
         """
-        rate = 2.0 * np.arccosh(1.0 + min(gap, 1e100))
-        missed = truncation_error(np.arange(len(self.deviation) - 1.0), rate)
+        xi = np.arccosh(1.0 + min(gap, 1e100))
+        missed = truncation_error(np.arange(len(self.deviation) - 1.0), xi, xi)
         return float(self.deviation @ np.append(1.0, missed)[: len(self.deviation)])
 
 
@@ -174,7 +177,7 @@ def one_body_response(body: OneBody, tolerance: float) -> Response:
             f"the template of {len(body.mesh.triangles)} elements is {wrong[0]:.1e} off for a lone "
             "sphere: its edges are too long"
         )
-    felt = np.append(1.0, truncation_error(np.arange(count - 1.0), 0.0))
+    felt = np.append(1.0, truncation_error(np.arange(count - 1.0), 0.0, 0.0))
     resolved = int(np.argmin(np.append(wrong * felt <= 0.01 * tolerance, False)))
     response[:resolved] = body.response[:resolved]
     matrix = response_matrix(response)
@@ -187,18 +190,20 @@ def solve(
 ) -> Solution:
     """Solve a planned scene."""
     flow = np.asarray(flow, dtype=float)
-    gap = float(_distances(plan.centres).min() - 1.0)
+    gap = float(centre_distances(plan.centres).min() - 1.0)
     n = len(plan.centres)
     if not np.any(flow):
         return Solution(np.zeros((n, 3)), 0, 0.0, np.zeros(n), gap, CONVERGED)
-    goal = 0.01 * tolerance
+    # The system's condition grows as the smallest gap closes, and a residual says less.
+    strain = np.sqrt(min(gap, 1.0))
+    goal = 0.01 * tolerance * strain
     matrix = (response.data, response.indices, response.starts)
     force, iterations, residual = solve_scene(
         plan.centres / RADIUS, flow, plan.orders, matrix, translation_tables(), goal,
         MOST_ITERATIONS,
     )  # fmt: skip
     # The residual is relative to all spheres together, and may sit on one of them.
-    estimate = plan.error + response.error(gap) + np.sqrt(n) * residual
+    estimate = plan.error + response.error(gap) + np.sqrt(n) * residual / strain
     if residual > goal or not np.isfinite(force).all():
         status = NOT_CONVERGED
     else:
@@ -226,9 +231,7 @@ def forces_on_fixed_spheres(centres, flow=(0.0, 1.0, 0.0), tolerance: float = 1e
     Raises ValueError if shapes are wrong, values are not finite, or spheres overlap, and
     RuntimeError if GMRES does not converge. Warns where the estimated error exceeds the tolerance.
     """
-    flow = np.asarray(flow, dtype=float)
-    if flow.shape != (3,) or not np.isfinite(flow).all():
-        raise ValueError(f"flow must be three finite numbers, not {flow.tolist()}")
+    flow = checked_flow(flow)
     plan = plan_scene(centres, tolerance)
     speed = np.linalg.norm(flow)
     response = _template_response(tolerance)
@@ -246,28 +249,3 @@ def forces_on_fixed_spheres(centres, flow=(0.0, 1.0, 0.0), tolerance: float = 1e
             stacklevel=2,
         )
     return solution.force
-
-
-def _checked_centres(centres) -> np.ndarray:
-    centres = np.ascontiguousarray(centres, dtype=float)
-    if centres.ndim != 2 or centres.shape[1] != 3 or len(centres) == 0:
-        raise ValueError(f"centres must have the shape (n, 3) with n >= 1, not {centres.shape}")
-    bad = np.flatnonzero(~np.isfinite(centres).all(axis=1))
-    if len(bad):
-        raise ValueError(f"centre of sphere {bad[0]} is not finite: {centres[bad[0]].tolist()}")
-    distance = _distances(centres)
-    i, j = np.unravel_index(distance.argmin(), distance.shape)
-    if distance[i, j] <= 1.0:
-        raise ValueError(
-            f"spheres {i} and {j} overlap or touch: their centres are {distance[i, j]:.6g} d_p "
-            "apart, more than 1 is needed"
-        )
-    return centres
-
-
-def _distances(centres) -> np.ndarray:
-    """(n, n) centre distances, inf on the diagonal."""
-    difference = centres[:, None, :] - centres[None, :, :]
-    distance = np.sqrt((difference**2).sum(axis=2))
-    np.fill_diagonal(distance, np.inf)
-    return distance

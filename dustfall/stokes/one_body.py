@@ -17,7 +17,8 @@ from scipy.linalg import cho_factor, cho_solve
 from dustfall.files import atomic
 from dustfall.stokes.harmonics import axes_swapped, real_harmonics, total_momentum_projectors
 from dustfall.stokes.mesh import SphereMesh
-from dustfall.stokes.single_layer import RADIUS, nodal_integrals, self_interaction
+from dustfall.stokes.single_layer import nodal_integrals, self_interaction
+from dustfall.stokes.spheres import RADIUS
 
 RESPONSE_DEGREE = 10
 """Largest degree of the harmonics for which a template's answer is computed."""

@@ -28,9 +28,9 @@ _COMPONENTS = (0, 1, -1)
 
 
 @cache
-def translation_tables():
+def translation_tables(degree: int = MOST_DEGREE):
     """What does not depend on the pair: moved potentials, gradients, products, swapped axes."""
-    size = MOST_DEGREE + 3
+    size = degree + 3
     m, to, of = np.ogrid[:size, :size, :size]
     # Z_lm / r^(l+1) about a centre at the distance 1, in the regular solid harmonics about here.
     moved = np.sqrt(comb(of + to, of + m) * comb(of + to, of - m) * (2 * of + 1) / (2 * to + 1))
@@ -66,7 +66,7 @@ def translation_tables():
             -lowered * root((l + m) * (l + m - 1) / below),
         ]
     )
-    swap = axes_swapped(MOST_DEGREE)
+    swap = axes_swapped(degree)
     return (
         moved,
         np.where(inside, gradient, 0.0),

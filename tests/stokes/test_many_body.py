@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.distance import pdist
 from scipy.spatial.transform import Rotation
 
 from dustfall.scenes import random_scenes
@@ -53,24 +54,29 @@ def test_two_spheres_to_eight_digits(s):
         assert ratio(pair(s), axis, 1e-8) == pytest.approx(float(value), abs=1e-8)
 
 
-# Values on which two independent methods agree to the digits given, or which one method gives.
+# Force over isolated drag by fundamental solutions, to the digits given.
 MORE_SPHERES = [
-    (triangle(3.0), 2, {0: 0.662821}),
-    (triangle(10.0), 2, {0: 0.868981}),
-    (chain(3.0), 2, {0: 0.646844, 1: 0.442714}),
-    (chain(10.0), 2, {0: 0.825828, 1: 0.754613}),
-    (chain(3.0), 1, {0: 0.743022, 1: 0.618113}),
-    (six(3.0), 0, {0: 0.264987}),
-    (six(3.0), 2, {0: 0.302693}),
+    (triangle(2.02), 2, {0: 0.57695375}),
+    (triangle(3.0), 2, {0: 0.6628208613}),
+    (triangle(10.0), 2, {0: 0.8689805385}),
+    (chain(3.0), 2, {0: 0.6468436065, 1: 0.4427135664}),
+    (chain(10.0), 2, {0: 0.8258280577, 1: 0.7546132077}),
+    (chain(3.0), 1, {0: 0.743022433, 1: 0.6181127389}),
+    (six(2.05), 0, {0: 0.1679277798}),
+    (six(2.1), 0, {0: 0.1734726834}),
+    (six(3.0), 0, {0: 0.2649865768}),
+    (six(3.0), 2, {0: 0.3026925458}),
 ]
 
 
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8])
 @pytest.mark.parametrize(("centres", "axis", "expected"), MORE_SPHERES)
-def test_more_spheres_feel_the_known_force(centres, axis, expected):
-    for tolerance, bound in ((1e-4, 1e-4), (1e-6, 1.5e-6)):
-        force = ratio(centres, axis, tolerance)
-        for sphere, value in expected.items():
-            assert force[sphere] == pytest.approx(value, abs=bound)
+def test_more_spheres_feel_the_known_force(centres, axis, expected, tolerance):
+    if tolerance == 1e-8 and pdist(centres).min() < 1.2:
+        pytest.skip("nearer than the reference is known to 1e-8")
+    force = ratio(centres, axis, tolerance)
+    for sphere, value in expected.items():
+        assert force[sphere] == pytest.approx(value, abs=tolerance)
 
 
 def test_isolated_sphere_feels_stokes_drag():

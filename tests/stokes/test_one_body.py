@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from dustfall.stokes.harmonics import single_layer_spectrum
-from dustfall.stokes.many_body import FORCE_UNIT, one_body_response
+from dustfall.stokes.many_body import one_body_response
 from dustfall.stokes.mesh import sphere_mesh
 from dustfall.stokes.one_body import RESPONSE_DEGREE, OneBody
+from dustfall.stokes.spheres import FORCE_UNIT
 
 SIZES = (0.7, 0.5, 0.35)
 SPECTRUM = single_layer_spectrum(RESPONSE_DEGREE)

@@ -1,18 +1,37 @@
 rule solver_benchmark:
-    """Run time of the Stokes solver against the error of the force."""
+    """Run time of the Stokes solver, its rungs, references and peers against the error."""
     input:
         operator=f"results/operators/{TEMPLATE}.h5",
         library=library("solver_benchmark.py"),
     output:
-        "results/benchmarks/{law}.csv",
+        error="results/benchmarks/solver.csv",
+        picture="results/benchmarks/solver.png",
+        print="results/benchmarks/solver.pdf",
+        spheres="results/benchmarks/spheres.csv",
     log:
-        "logs/benchmarks/{law}.log",
+        "logs/benchmarks/solver.log",
     params:
         seed=config["seed"],
-        law=lambda wc: wc.law,
-        scenes=config["benchmarks"]["scenes"],
         phi_min=config["scenes"]["phi_min"],
         phi_max=config["scenes"]["phi_max"],
+        scenes=config["benchmarks"]["scenes"],
+        few=config["benchmarks"]["few"],
         tolerances=config["benchmarks"]["tolerances"],
+        spheres=config["benchmarks"]["spheres"],
     script:
         "../scripts/solver_benchmark.py"
+
+
+rule stress:
+    """Gaps, distances, turns and condition numbers that strain the solver."""
+    input:
+        operator=f"results/operators/{TEMPLATE}.h5",
+        library=library("stress.py"),
+    output:
+        "results/benchmarks/stress.csv",
+    log:
+        "logs/benchmarks/stress.log",
+    params:
+        tolerances=config["benchmarks"]["tolerances"],
+    script:
+        "../scripts/stress.py"

@@ -3,9 +3,9 @@
 import h5py
 
 import joblog
-from dustfall.stokes.many_body import FORCE_UNIT
 from dustfall.stokes.mesh import SphereMesh
 from dustfall.stokes.one_body import OneBody
+from dustfall.stokes.spheres import FORCE_UNIT
 
 joblog.start(snakemake.log[0])
 
