@@ -39,7 +39,7 @@ class ConstantCollocation:
         self.unknowns = len(self.elements.area)
         self.test_weights = np.ones(self.unknowns)
         self.test_normals = self.elements.normal
-        self.trial_normals = self.elements.area[:, None] * self.elements.normal
+        self.trial_normals = self.elements.vector_area
         self.forces = RADIUS * self.elements.area
 
     def self_matrix(self) -> np.ndarray:

@@ -25,7 +25,7 @@ from dustfall.stokes.single_layer import put_block, stokeslet
 MOST_POINTS = 6
 """Gauss points a direction beyond which an element is cut instead."""
 
-SINGULAR_POINTS = 8
+SINGULAR_POINTS = 20
 """Points a direction in each third of the element that holds the target itself."""
 
 
@@ -33,7 +33,8 @@ class Elements(NamedTuple):
     """The elements of one sphere with all that their integrals need.
 
     corners: (e, 3, 3). flat: elements are flat, not projected. centre: (e, 3) centroids, where the
-    equation holds. normal: (e, 3) outward at the centroid. area: (e,). reach: (e,) from the
+    equation holds. normal: (e, 3) outward at the centroid. area: (e,); vector_area: (e, 3),
+    integral of the normal. reach: (e,) from the
     centroid to the farthest corner. far: distance, in reaches, from which 1, 2, ... points a
     direction are enough; rules: their barycentric points and weights; points, weights: the same
     on every element. singular_points, singular_weights: for the target on the element itself.
@@ -44,6 +45,7 @@ class Elements(NamedTuple):
     centre: np.ndarray
     normal: np.ndarray
     area: np.ndarray
+    vector_area: np.ndarray
     reach: np.ndarray
     far: np.ndarray
     rules: tuple
@@ -64,6 +66,8 @@ def elements_of(mesh: SphereMesh, flat: bool, tolerance: float) -> Elements:
     rules = tuple(triangle_rule(int(n)) for n in counts)
     singular_points, singular_weights = _on_every_element(corners, flat, *_singular_rule())
     area = singular_weights.sum(axis=1)
+    # On the unit sphere the normal is the position.
+    facing = np.einsum("eq,eqk->ek", singular_weights, singular_points)
     placed = [_on_every_element(corners, flat, *rule) for rule in rules]
     far = np.sinh(np.log(1.0 / tolerance) / (2.0 * counts))
     # However far the target, a projected element needs points enough for its own area.
@@ -79,6 +83,7 @@ def elements_of(mesh: SphereMesh, flat: bool, tolerance: float) -> Elements:
         centre=centre,
         normal=normal,
         area=area,
+        vector_area=area[:, None] * normal if flat else facing,
         reach=np.array([r for _, r in size]),
         far=far,
         rules=rules,

@@ -6,6 +6,9 @@ from functools import cached_property
 import gmsh
 import numpy as np
 
+LARGEST_SIZE = 1.5
+"""Longest edges [radii] that still make a closed, convex mesh."""
+
 
 @dataclass(frozen=True, eq=False)
 class SphereMesh:
@@ -44,13 +47,21 @@ class SphereMesh:
         return 2.0 * np.arctan2(triple, 1.0 + dots)
 
 
-def sphere_mesh(size: float) -> SphereMesh:
+GROWTH = 0.5
+"""Edge length gained per distance from the point that a graded mesh refines towards."""
+
+
+def sphere_mesh(size: float, toward=(), finest: float = LARGEST_SIZE) -> SphereMesh:
     """Mesh the unit sphere with gmsh; `size` is the edge length [radii].
 
-    Raises ValueError unless 0 < size <= 1.5.
+    toward: (k, 3) directions in which edges shrink to `finest` [radii], for spheres that nearly
+    touch there: the traction varies over sqrt(gap * radius), and edges should be no longer.
+    Raises ValueError unless 0 < size <= LARGEST_SIZE and finest is above 0.
     """
-    if not 0.0 < size <= 1.5:
-        raise ValueError(f"edge length {size} radii: it must lie in (0, 1.5]")
+    if not finest > 0.0:
+        raise ValueError(f"finest edge length {finest} radii: it must be above 0")
+    if not 0.0 < size <= LARGEST_SIZE:
+        raise ValueError(f"edge length {size} radii: it must lie in (0, {LARGEST_SIZE}]")
 
     already_running = gmsh.isInitialized()
     if not already_running:
@@ -61,8 +72,12 @@ def sphere_mesh(size: float) -> SphereMesh:
     try:
         gmsh.model.occ.addSphere(0.0, 0.0, 0.0, 1.0)
         gmsh.model.occ.synchronize()
-        gmsh.option.setNumber("Mesh.MeshSizeMin", size)
+        gmsh.option.setNumber("Mesh.MeshSizeMin", min(finest, size))
+        for source in ("ExtendFromBoundary", "FromPoints"):
+            gmsh.option.setNumber(f"Mesh.MeshSize{source}", 0 if len(toward) else 1)
         gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+        if len(toward):
+            _grade(toward, finest)
         gmsh.model.mesh.generate(2)
         tags, coordinates, _ = gmsh.model.mesh.getNodes()
         _, corners = gmsh.model.mesh.getElementsByType(
@@ -86,3 +101,18 @@ def sphere_mesh(size: float) -> SphereMesh:
     inward = np.einsum("ij,ij->i", a, np.cross(b, c)) < 0.0
     triangles[inward] = triangles[inward][:, [0, 2, 1]]
     return SphereMesh(vertices, triangles)
+
+
+def _grade(toward, finest):
+    """Set the edge length that grows from `finest` with the distance from points of the sphere."""
+    toward = np.asarray(toward, dtype=float)
+    add = gmsh.model.mesh.field.add
+    fields = []
+    for x, y, z in toward / np.linalg.norm(toward, axis=1, keepdims=True):
+        field = add("MathEval")
+        distance = f"sqrt((x-({x}))^2+(y-({y}))^2+(z-({z}))^2)"
+        gmsh.model.mesh.field.setString(field, "F", f"{finest}+{GROWTH}*{distance}")
+        fields.append(field)
+    smallest = add("Min")
+    gmsh.model.mesh.field.setNumbers(smallest, "FieldsList", fields)
+    gmsh.model.mesh.field.setAsBackgroundMesh(smallest)

@@ -7,11 +7,17 @@ import pytest
 from dustfall.analysis.mesh_study import mesh_study_table
 
 
-def study(error, nodes=(50, 100, 200, 400), scheme="flat"):
+def study(error, nodes=(50, 100, 200, 400), scheme="flat", limit=24.0):
     nodes = np.array(nodes)
     force = 24 * (1 + error(nodes))
     return pd.DataFrame(
-        {"scheme": scheme, "nodes": nodes, "elements": 2 * nodes - 4, "force": force}
+        {
+            "scheme": scheme,
+            "nodes": nodes,
+            "elements": 2 * nodes - 4,
+            "force": force,
+            "limit": limit,
+        }
     )
 
 
@@ -20,6 +26,13 @@ def test_order_is_that_of_the_error_in_element_size():
     ours = table[table["scheme"] == "flat"]
     np.testing.assert_allclose(ours["order"], 2)
     np.testing.assert_allclose(ours["error"], 3.0 / ours["nodes"])
+
+
+def test_order_is_that_towards_the_limit_of_the_formulation():
+    table = mesh_study_table(study(lambda nodes: 0.01 - 3.0 / nodes, limit=24.24))
+    ours = table[table["scheme"] == "flat"]
+    np.testing.assert_allclose(ours["order"], 2)
+    np.testing.assert_allclose(ours["error"], np.abs(0.01 - 3.0 / ours["nodes"]))
 
 
 def test_the_papers_points_stand_beside_and_have_no_order_as_they_pass_through_24():

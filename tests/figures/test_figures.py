@@ -194,7 +194,9 @@ def ergodicity():
 def mesh_study():
     nodes = np.array([50, 100, 200])
     study = [
-        pd.DataFrame({"scheme": s, "nodes": nodes, "elements": 2 * nodes, "force": 24 - f / nodes})
+        pd.DataFrame(
+            {"scheme": s, "nodes": nodes, "elements": 2 * nodes, "force": 24 - f / nodes}
+        ).assign(limit=24.0)
         for s, f in {"flat": 60.0, "projected": 2.0}.items()
     ]
     return mesh_study_table(pd.concat(study, ignore_index=True))

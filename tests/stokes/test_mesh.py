@@ -5,10 +5,12 @@ import pytest
 
 from dustfall.stokes.mesh import sphere_mesh
 
+TOWARD = np.array([[0.0, 0.0, 2.0], [0.5, -1.0, 0.3]])
 
-@pytest.fixture(params=[1.0, 0.5, 0.3], scope="module")
+
+@pytest.fixture(params=[(1.0,), (0.5,), (0.3,), (0.8, TOWARD, 0.05)], scope="module")
 def mesh(request):
-    return sphere_mesh(request.param)
+    return sphere_mesh(*request.param)
 
 
 def test_surface_is_closed_and_simple(mesh):
@@ -31,6 +33,23 @@ def test_edges_have_the_length_asked_for():
         assert 0.75 * size < np.median(length) < 1.25 * size
 
 
+def test_edges_shrink_towards_the_directions_given_and_nowhere_else():
+    mesh = sphere_mesh(0.8, TOWARD, 0.05)
+    ends = mesh.vertices[mesh.edges]
+    length = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
+    for direction in TOWARD / np.linalg.norm(TOWARD, axis=1, keepdims=True):
+        away = np.linalg.norm(ends.mean(axis=1) - direction, axis=1)
+        assert 0.03 < np.median(length[away < 0.06]) < 0.1
+    assert length.max() > 0.5
+    assert len(mesh.triangles) < 400
+
+
+def test_a_graded_mesh_leaves_the_next_one_uniform():
+    before = sphere_mesh(0.5)
+    sphere_mesh(0.8, TOWARD, 0.05)
+    np.testing.assert_array_equal(sphere_mesh(0.5).vertices, before.vertices)
+
+
 def test_same_size_gives_the_same_mesh():
     one, other = sphere_mesh(0.5), sphere_mesh(0.5)
     np.testing.assert_array_equal(one.vertices, other.vertices)
@@ -41,3 +60,5 @@ def test_same_size_gives_the_same_mesh():
 def test_impossible_edge_length_is_refused(size):
     with pytest.raises(ValueError, match="edge length"):
         sphere_mesh(size)
+    with pytest.raises(ValueError, match="edge length"):
+        sphere_mesh(0.5, TOWARD, -0.1)

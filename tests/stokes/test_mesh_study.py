@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from dustfall.stokes.mesh_study import convergence_table, grid_convergence, mesh_study
+from dustfall.stokes.boundary_elements import SCHEMES
+from dustfall.stokes.mesh_study import (
+    PAPER_FORMULATION,
+    convergence_table,
+    grid_convergence,
+    mesh_study,
+)
+
+FLAT, PROJECTED, LINEAR, QUADRATIC = SCHEMES
 
 
 def test_worked_example_of_celik_2008():
@@ -31,19 +39,40 @@ def test_no_order_where_there_is_none():
         grid_convergence([0.3, 0.2, 0.1], [1.0, 2.0, 3.0])
 
 
-def test_each_scheme_has_its_known_error_on_an_isolated_sphere():
-    study = mesh_study([0.7, 0.5, 0.35])
+@pytest.fixture(scope="module")
+def study():
+    return mesh_study([0.7, 0.5, 0.35])
+
+
+def test_each_scheme_has_its_known_error_on_an_isolated_sphere(study):
     error = study.pivot(index="size", columns="scheme", values="force").sort_index() / 24.0 - 1.0
-    flat = error["constant, flat elements"]
-    projected = error["constant, projected elements"]
-    galerkin = error["quadratic Galerkin, projected elements"]
     # Geometry: flat elements lose area, second order in their size.
-    assert -0.015 > flat[0.35] > -0.04
-    assert flat[0.7] / flat[0.35] == pytest.approx(4.0, rel=0.3)
-    # Projection alone takes it down by two orders of magnitude, quadratic Galerkin by two more.
-    assert np.all(np.abs(projected) < 0.02 * np.abs(flat))
-    assert np.all(np.abs(galerkin) < 0.02 * np.abs(flat))
-    assert abs(galerkin[0.35]) < 1e-7
+    assert -0.02 > error.loc[0.5, FLAT] > -0.04
+    # Projection alone takes it down by two orders of magnitude, Galerkin by more.
+    for scheme in (PROJECTED, LINEAR, QUADRATIC):
+        assert np.all(np.abs(error[scheme]) < 0.02 * np.abs(error[FLAT]))
+    assert abs(error.loc[0.5, QUADRATIC]) < 1e-6
+
+
+def test_paper_formulation_is_the_flat_scheme_and_a_wall(study):
+    force = study.pivot(index="size", columns="scheme", values="force")
+    limit = study.groupby("scheme")["limit"].first()
+    wall = limit[PAPER_FORMULATION] / 24.0 - 1.0
+    assert wall == pytest.approx(2.25 / 1024, rel=3e-3)
+    np.testing.assert_allclose(force[PAPER_FORMULATION] / force[FLAT] - 1.0, wall, rtol=0.15)
+
+
+def test_flat_schemes_extrapolate_to_their_limits(study):
     table = convergence_table(study).set_index("scheme")
-    assert 1.5 < table.loc["constant, flat elements", "order"] < 2.5
-    assert table.loc["constant, flat elements", "extrapolated"] == pytest.approx(24.0, abs=0.15)
+    assert len(table) == len(SCHEMES) + 1
+    limit = study.groupby("scheme")["limit"].first()
+    for scheme in (FLAT, PAPER_FORMULATION):
+        assert 1.5 < table.loc[scheme, "order"] < 2.5
+        assert table.loc[scheme, "extrapolated"] == pytest.approx(limit[scheme], abs=0.3)
+
+
+def test_galerkin_schemes_leave_out_the_finest_meshes(monkeypatch):
+    monkeypatch.setattr("dustfall.stokes.mesh_study.GALERKIN_DOWN_TO", 0.9)
+    counted = mesh_study([1.0, 0.8]).groupby("scheme").size()
+    assert counted[[LINEAR, QUADRATIC]].tolist() == [1, 1]
+    assert counted[[FLAT, PROJECTED, PAPER_FORMULATION]].tolist() == [2, 2, 2]

@@ -6,7 +6,7 @@ from dustfall.stokes.mesh_study import convergence_table, mesh_study
 
 progress = joblog.start(snakemake.log[0])
 
-study = mesh_study(snakemake.params.sizes, progress("mesh study", "solves"))
+study = mesh_study(snakemake.params.sizes, progress("mesh study", "meshes"))
 convergence = convergence_table(study)
 print(convergence.to_string(index=False))
 for table, target in ((study, snakemake.output.study), (convergence, snakemake.output.convergence)):
