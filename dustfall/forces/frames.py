@@ -34,7 +34,7 @@ def rotation_to_streamwise(velocity) -> np.ndarray:
     return rotation[0] if velocity.ndim == 1 else rotation
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _rotations(velocity):
     rotation = np.empty((velocity.shape[0], 3, 3))
     for n in range(velocity.shape[0]):
@@ -105,7 +105,7 @@ def check_neighbours(neighbours) -> np.ndarray:
     return neighbours
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def sort_by_distance(neighbours):
     """Return scenes (m, 5, 3) with neighbours in order of distance from the reference sphere.
 
@@ -129,7 +129,7 @@ def sort_by_distance(neighbours):
     return result
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _is_before(scene, square, j, i):
     if square[j] != square[i]:
         return square[j] < square[i]
@@ -139,7 +139,7 @@ def _is_before(scene, square, j, i):
     return False
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def hold_at_contact(neighbours):
     """Return scenes (m, 5, 3) where each neighbour closer than one d_p is moved out to one d_p."""
     result = np.empty_like(neighbours)
@@ -152,7 +152,7 @@ def hold_at_contact(neighbours):
     return result
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def canonical_frame(neighbours):
     """Bring sorted scenes into the canonical frame of the symmetries of Stokes flow.
 
@@ -198,7 +198,7 @@ def canonical_frame(neighbours):
     return canonical, axes
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _length(vector):
     return np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
 

@@ -9,7 +9,7 @@ _HALVINGS = 4
 _LARGEST = 18.0  # tanh of it is one to 5e-16
 
 
-@njit(cache=True, fastmath={"contract"}, error_model="numpy")
+@njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
 def evaluate(inputs, envelope, mean, scale, parameters, widths, applications, bounded, outputs):
     """Return the network's output (m, outputs) in units of its target's scale.
 
@@ -56,7 +56,7 @@ def evaluate(inputs, envelope, mean, scale, parameters, widths, applications, bo
     return result
 
 
-@njit(cache=True, fastmath={"contract"}, error_model="numpy")
+@njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
 def _affine(parameters, offset, layer, wide, following, narrow):
     # Four inputs at a time: the sum is read and written once for four products.
     bias = offset + narrow * wide
@@ -78,7 +78,7 @@ def _affine(parameters, offset, layer, wide, following, narrow):
                 total[lane] += w0 * h0[lane]
 
 
-@njit(cache=True, fastmath={"contract"}, error_model="numpy")
+@njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
 def _tanh(layer, rows):
     # tanh x = 1 - 2/(exp 2x + 1), exp by its series on a small argument and repeated squaring:
     # the library's tanh does not vectorise and would cost most of the time. Error below 1e-9.
