@@ -80,10 +80,9 @@ def cases(config: dict) -> dict[str, Case]:
     }
 
 
-def start_file(config: dict, case: str) -> list[str]:
-    """File that a case starts from, if any; {case} in its name stands for the name of the case."""
-    pattern = config["sedimentation"]["start_file"]
-    return [pattern.replace("{case}", case)] if pattern else []
+def start_file(config: dict, case: str) -> str | list:
+    """File that a case starts from, [] for none; {case} in its name stands for the case's name."""
+    return config["sedimentation"]["start_file"].replace("{case}", case) or []
 
 
 def case_seed(config: dict, case: str) -> int:

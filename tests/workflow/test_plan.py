@@ -93,6 +93,28 @@ def test_cases_of_the_galileo_series_are_added_once():
     assert len(plan.cases(apart)) == 21
 
 
+def test_further_seeds_leave_the_names_of_the_first_as_they_are():
+    one = plan.cases(configure({}))
+    three = plan.cases(configure({"sedimentation": {"seeds": 3}}))
+    assert len(three) == 3 * len(one)
+    assert list(three)[: len(one)] == list(one)
+    assert plan.Case(1000, 1e-3, 1.0, 2).name == "n1000_phi1e-03_ga1_seed2"
+    config = configure({})
+    assert len({plan.case_seed(config, case) for case in three}) == len(three)
+
+
+def test_start_file_may_be_one_for_each_case():
+    config = configure({"sedimentation": {"start_file": "starts/{case}.nc"}})
+    assert plan.start_file(config, "n6_phi1e-03_ga1") == "starts/n6_phi1e-03_ga1.nc"
+    assert plan.start_file(configure({}), "n6_phi1e-03_ga1") == []
+
+
+def test_studies_are_no_part_of_all_and_take_one_run_a_step(project):
+    jobs = project.plan("--config", "sedimentation={model: rotne_prager}", "--", "studies")
+    jobs.pop("studies", None)
+    assert jobs == {"study_of_a_step": 6, "step_size": 1}
+
+
 def test_trial_names_are_file_names_and_lead_back_to_their_layers():
     config = configure({})
     names = [trial.split("/")[1] for trial in plan.trials(config)]
