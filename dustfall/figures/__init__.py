@@ -9,6 +9,7 @@ from dustfall.figures.settling import (
     phase_and_spectra,
     settling_in_time,
     trajectories,
+    trajectories_3d,
 )
 from dustfall.figures.style import save
 from dustfall.figures.voronoi import voronoi_pdf, voronoi_variance
@@ -27,6 +28,7 @@ __all__ = [
     "settling_in_time",
     "spearman",
     "trajectories",
+    "trajectories_3d",
     "voronoi_pdf",
     "voronoi_variance",
 ]

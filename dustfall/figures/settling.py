@@ -33,6 +33,9 @@ MODEL_NAMES = {
 }
 """What a force model is called in a legend, by its `name`."""
 
+OBLIQUE = (0.45, 0.035)
+"""How far depth is drawn to the right, in sides of the box, and up, in its height."""
+
 ASH = "volcanic ash, up to (Del Bello et al. 2017)"
 
 
@@ -273,9 +276,70 @@ def trajectories(frame: pd.DataFrame) -> Figure:
             above.set_yticklabels([])
     axes[0, 0].set_ylabel("side view: $z - z_0$ [$d_p$]")
     axes[1, 0].set_ylabel("top view: $y - y_0$ [$d_p$]")
+    _particle_legend(figure, frame)
+    return figure
+
+
+@styled
+def trajectories_3d(frame: pd.DataFrame) -> Figure:
+    """Paths of the tracked particles in space, unwrapped, one panel a volume fraction.
+
+    `frame` as for `trajectories`. Sideways scales are each panel's own and written beside it; all
+    panels share the vertical one. Raises ValueError for a missing column, several n or fewer than
+    two rows.
+    """
+    columns = ["volume_fraction", "n", "particle", "dx", "dy", "dz"]
+    require(frame, columns, "trajectories_3d", fewest=2)
+    if frame["n"].nunique() > 1:
+        raise ValueError(f"trajectories_3d draws one n, not {frame['n'].unique().tolist()}")
+    phis = sorted(frame["volume_fraction"].unique())
+    figure = new_figure(DOUBLE if len(phis) > 2 else SINGLE, 4.6)
+    axes = figure.subplots(1, len(phis), squeeze=False, sharey=True)[0]
+    floor = 1.03 * frame["dz"].min()
+    for ax, phi in zip(axes, phis, strict=True):
+        rows = frame[frame["volume_fraction"] == phi]
+        reach = 1.1 * rows[["dx", "dy"]].abs().to_numpy().max() or 1.0
+        _box(ax, floor)
+        for i, (_, path) in enumerate(rows.groupby("particle")):
+            colour = PARTICLE_COLOURS[i % len(PARTICLE_COLOURS)]
+            across, deep = path["dx"] / reach, path["dy"] / reach
+            ax.plot(*_oblique(across, deep, path["dz"], floor), color=colour, lw=1)
+            # Its shadow on the floor shows where a path goes sideways.
+            shadow = _oblique(across, deep, np.full(len(path), floor), floor)
+            ax.plot(*shadow, color=colour, lw=0.7, alpha=0.5)
+        ax.set_title(f"$\\varphi = ${phi_label(phi)}")
+        ax.set_xlabel(f"$\\pm {reach:.2g}\\,d_p$")
+        ax.set_xticks([])
+        ax.spines[["top", "right", "bottom"]].set_visible(False)
+        ax.tick_params(right=False)
+        ax.yaxis.set_major_locator(MaxNLocator(6))
+        if ax is not axes[0]:
+            ax.spines["left"].set_visible(False)
+            ax.tick_params(left=False)
+    axes[0].set_ylabel("$z - z_0$ [$d_p$]")
+    _particle_legend(figure, frame)
+    return figure
+
+
+def _oblique(across, deep, up, floor):
+    """Cabinet projection of places in [-1, 1] sideways and of heights; depth leads up and right."""
+    return across + OBLIQUE[0] * deep, up - OBLIQUE[1] * floor * deep
+
+
+def _box(ax, floor):
+    """Edges of the space that a panel shows."""
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]])
+    for height in (0, floor):
+        x, z = _oblique(*corners.T, np.full(5, height), floor)
+        ax.plot(x, z, color="0.75", lw=0.6, zorder=0)
+    for corner in corners[:4]:
+        x, z = _oblique(*np.tile(corner, (2, 1)).T, np.array([0, floor]), floor)
+        ax.plot(x, z, color="0.75", lw=0.6, zorder=0)
+
+
+def _particle_legend(figure, frame):
     handles = [
         Line2D([], [], color=PARTICLE_COLOURS[i % len(PARTICLE_COLOURS)], label=f"particle {p}")
         for i, p in enumerate(sorted(frame["particle"].unique()))
     ]
     figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))
-    return figure

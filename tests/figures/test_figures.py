@@ -110,6 +110,10 @@ def trajectories():
     )
 
 
+def trajectories_3d():
+    return trajectories()
+
+
 def voronoi_pdf():
     volume = np.linspace(0.05, 3, 30)
     density = volume**4 * np.exp(-5 * volume)
@@ -215,6 +219,7 @@ TABLES = {
         cloud_spectra,
         ergodicity,
         trajectories,
+        trajectories_3d,
         frozen_cloud,
         voronoi_pdf,
         voronoi_variance,
@@ -282,6 +287,21 @@ def test_force_models_stand_in_a_panel_of_their_own_at_the_n_that_they_share():
     assert labels[:2] == ["IDNN", "Rotne-Prager inverse"]
 
 
+def test_paths_in_space_keep_their_heights_and_cast_their_shadows_on_the_floor():
+    table = trajectories()
+    axes = figures.trajectories_3d(table).axes
+    assert len(axes) == len(PHI)
+    for ax, (_, rows) in zip(axes, table.groupby("volume_fraction"), strict=True):
+        for _, path in rows.groupby("particle"):
+            depth = 0.035 * 1.03 * table["dz"].min() * path["dy"]
+            reach = 1.1 * rows[["dx", "dy"]].abs().to_numpy().max()
+            expected = (path["dz"] - depth / reach).to_numpy()
+            assert any(
+                len(line.get_ydata()) == len(path) and np.allclose(line.get_ydata(), expected)
+                for line in ax.lines
+            )
+
+
 def test_ridges_are_the_densities_on_one_scale_within_a_decade():
     table = force_pdf()
     left, right = figures.force_pdf(table).axes
@@ -338,7 +358,7 @@ def test_empty_tables_and_missing_columns_are_refused(name):
     with pytest.raises(ValueError, match=f"{name} has 0 rows"):
         draw(table.iloc[:0])
     drawn = XY.get(name, ("density" if name == "force_pdf" else "volume_fraction",))[-1]
-    drawn = "dz" if name == "trajectories" else drawn
+    drawn = "dz" if name.startswith("trajectories") else drawn
     with pytest.raises(ValueError, match=f"{name} lacks the column '{drawn}'"):
         draw(table.drop(columns=drawn))
 
@@ -352,6 +372,7 @@ def test_empty_tables_and_missing_columns_are_refused(name):
         "cloud_spectra",
         "ergodicity",
         "trajectories",
+        "trajectories_3d",
         "frozen_cloud",
         "voronoi_pdf",
     ],
@@ -376,7 +397,13 @@ def test_tables_of_several_cases_are_refused_where_one_is_drawn():
         figures.settling_in_time(
             pd.concat([settling_in_time(), settling_in_time().assign(model="dense")])
         )
-    for name in ("trajectories", "phase_and_spectra", "cloud_spectra", "ergodicity"):
+    for name in (
+        "trajectories",
+        "trajectories_3d",
+        "phase_and_spectra",
+        "cloud_spectra",
+        "ergodicity",
+    ):
         with pytest.raises(ValueError, match="one n"):
             getattr(figures, name)(pd.concat([TABLES[name](), TABLES[name]().assign(n=33000)]))
     with pytest.raises(ValueError, match="'simulation'"):

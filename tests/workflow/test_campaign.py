@@ -29,6 +29,8 @@ SETTLING = {
     "sedimentation": 7,
     "figure_settling_in_time": 1,
     "figure_trajectories": 1,
+    "figure_trajectories_3d": 1,
+    "movie": 1,
     **STEADY,
 }
 FROM_DATA = {"dataset": 1, **DATA_FIGURES, **MODELS, **SETTLING}
@@ -37,11 +39,12 @@ FROM_DATA = {"dataset": 1, **DATA_FIGURES, **MODELS, **SETTLING}
 def test_every_figure_is_there_with_its_numbers(campaign):
     folder = campaign.folder / "results/figures"
     pictures = sorted(folder.glob("*.png"))
-    assert len(pictures) == 14
+    assert len(pictures) == 15
     for picture in pictures:
         assert picture.read_bytes().startswith(b"\x89PNG")
         assert picture.with_suffix(".pdf").read_bytes().startswith(b"%PDF")
         assert len(picture.with_suffix(".csv").read_text().splitlines()) > 1
+    assert (folder / "settling_cloud.gif").read_bytes().startswith(b"GIF89a")
 
 
 def test_a_second_run_has_nothing_to_do(campaign):

@@ -18,6 +18,7 @@ FIGURES = [
     "cloud_spectra",
     "ergodicity",
     "trajectories",
+    "trajectories_3d",
     "frozen_cloud",
     "mesh_study",
 ]
@@ -45,6 +46,7 @@ def test_the_paper_takes_the_expected_jobs_and_fewer_than_a_thousand(project):
         "independence_of_n": 1,
         "neighbour_changes": 1,
         "mesh_study": 1,
+        "movie": 1,
         **{f"figure_{name}": 1 for name in FIGURES},
     }
     assert jobs == expected

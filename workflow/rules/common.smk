@@ -30,12 +30,12 @@ SHARDS = plan.shards(config)
 TRIALS = plan.trials(config)
 CASES = plan.cases(config)
 
-# The cases at the Galileo number of the properties; those of them with most particles, from one
-# start each; and the cases that differ in the Galileo number alone.
+# The cases at the Galileo number of the properties; those of them with most particles, from dilute
+# to dense and from one start each; and the cases that differ in the Galileo number alone.
 PLAIN_CASES = [name for name, case in CASES.items() if case.galileo_multiple == 1]
 LARGEST_CASES = [
     name
-    for name in PLAIN_CASES
+    for name in sorted(PLAIN_CASES, key=lambda name: CASES[name].volume_fraction)
     if CASES[name].particles == max(config["sedimentation"]["particles"])
     and CASES[name].volume_fraction in config["sedimentation"]["volume_fractions"]
     and CASES[name].seed == 1
@@ -65,8 +65,9 @@ FIGURES = expand(
         "cloud_spectra",
         "ergodicity",
         "trajectories",
+        "trajectories_3d",
         "frozen_cloud",
         "mesh_study",
     ],
     ending=["png", "pdf", "csv"],
-)
+) + ["results/figures/settling_cloud.gif"]

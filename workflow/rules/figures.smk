@@ -206,6 +206,40 @@ rule figure_trajectories:
         "../scripts/figure_trajectories.py"
 
 
+rule figure_trajectories_3d:
+    """The same paths in space."""
+    input:
+        series=expand("results/sedimentation/{case}.series.nc", case=LARGEST_CASES),
+        library=library("figure_trajectories_3d.py"),
+    output:
+        **figure("trajectories_3d", "Sedimentation"),
+    log:
+        "logs/figures/trajectories_3d.log",
+    script:
+        "../scripts/figure_trajectories_3d.py"
+
+
+rule movie:
+    """A slab of the densest cloud as it settles, coloured by velocity."""
+    input:
+        trajectory=f"results/sedimentation/{LARGEST_CASES[-1]}.nc",
+        library=library("movie.py"),
+    output:
+        report(
+            "results/figures/settling_cloud.gif",
+            category="Sedimentation",
+            caption="../report/settling_cloud.rst",
+        ),
+    log:
+        "logs/figures/settling_cloud.log",
+    benchmark:
+        "benchmarks/figures/settling_cloud.tsv"
+    params:
+        pictures=config["figures"]["movie_pictures"],
+    script:
+        "../scripts/movie.py"
+
+
 rule figure_voronoi_pdf:
     """P.d.f. of Voronoi volumes at each Galileo number."""
     input:

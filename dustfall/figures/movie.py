@@ -1,0 +1,138 @@
+"""A short movie of the settling cloud, coloured by velocity."""
+
+from collections.abc import Callable
+
+import matplotlib as mpl
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from PIL import Image
+
+from dustfall.figures.style import new_figure, phi_label, require, styled
+from dustfall.files import atomic
+
+SIZE = 4.8, 4.0
+"""Of a picture [inch]."""
+
+DPI = 110
+
+COLOURS = 128
+"""Of the palette, which all pictures share so that nothing flickers."""
+
+SLAB = 0.06
+"""Share of the cube, in depth, that is drawn: of the whole cloud one would see its front alone."""
+
+SMALLEST = 2.2
+"""Diameter of a dot at least [point]; true to scale where particles are larger."""
+
+
+def save_movie(
+    trajectory: xr.Dataset,
+    path,
+    frames: int,
+    milliseconds=120,
+    progress: Callable[[int, int], None] | None = None,
+) -> None:
+    """Write a GIF of a slab of the cloud, seen from the side, in the frame of its mean motion.
+
+    Parameters
+    ----------
+    trajectory : coordinates [d_p] and velocities [v_s] (frame, atom, spatial), time (frame) [tau],
+        cell_lengths (frame, cell_spatial) [d_p]; attributes n and volume_fraction
+    path : of the GIF, written atomically
+    frames : pictures at most, evenly spaced over the run from the first moving frame on
+    milliseconds : that a picture is shown
+
+    Raises
+    ------
+    ValueError : fewer than two frames in the trajectory, or fewer than two pictures asked for.
+    """
+    total = trajectory.sizes["frame"]
+    if total < 2 or frames < 2:
+        raise ValueError(f"{total} frames and {frames} pictures: a movie needs at least 2")
+    chosen = np.unique(np.linspace(0, total - 1, min(frames, total)).round().astype(int))
+    last = trajectory.isel(frame=-1)
+    speed = -last["velocities"][:, 2].values
+    limits = np.quantile(speed, [0.01, 0.99])
+    pictures = []
+    for done, k in enumerate(chosen, start=1):
+        pictures.append(_picture(cloud_slice(trajectory.isel(frame=k)), limits, trajectory.attrs))
+        if progress:
+            progress(done, len(chosen))
+    # The last picture has all colours of the scale; the first, at rest, has one.
+    palette = pictures[-1].quantize(COLOURS)
+    pictures = [p.quantize(palette=palette, dither=Image.Dither.NONE) for p in pictures]
+    with atomic(path) as temporary:
+        pictures[0].save(
+            temporary,
+            format="GIF",
+            save_all=True,
+            append_images=pictures[1:],
+            duration=milliseconds,
+            loop=0,
+        )
+
+
+def cloud_slice(frame: xr.Dataset):
+    """Side view of a slab of one frame: a table of x and z [d_p], velocity [v_s], and their frame.
+
+    Positions are relative to the mean position and folded into the cube, so that the fall of the
+    whole cloud is taken out. Returns a pandas DataFrame with the side and time as attributes.
+    """
+    side = float(frame["cell_lengths"][0])
+    position = frame["coordinates"].values.astype(float)
+    position = position - position.mean(axis=0)
+    position -= side * np.floor(position / side)
+    shown = position[:, 1] < SLAB * side
+    table = frame["velocities"][shown].to_pandas()
+    table = table.set_axis(["x", "y", "velocity"], axis=1).drop(columns="y")
+    table["velocity"] *= -1
+    table["x"], table["z"] = position[shown, 0], position[shown, 2]
+    table.attrs = {"side": side, "time": float(frame["time"])}
+    return table
+
+
+@styled
+def cloud_picture(frame, limits, volume_fraction: float, particles: int) -> Figure:
+    """One picture of the movie.
+
+    `frame`: x, z, velocity and the attributes side and time, as `cloud_slice` gives; `limits` of
+    the colour scale [v_s]. Raises ValueError for a missing column.
+    """
+    require(frame, ["x", "z", "velocity"], "cloud_picture")
+    side = frame.attrs["side"]
+    figure = new_figure(*SIZE)
+    ax = figure.subplots()
+    diameter = max(SMALLEST, 72 * 0.75 * SIZE[0] / side)
+    dots = ax.scatter(
+        frame["x"],
+        frame["z"],
+        c=frame["velocity"],
+        s=diameter**2,
+        lw=0,
+        cmap="viridis",
+        vmin=limits[0],
+        vmax=limits[1],
+    )
+    ax.set_xlim(0, side)
+    ax.set_ylim(0, side)
+    ax.set_aspect("equal")
+    ax.set_xlabel("$x$ [$d_p$]")
+    ax.set_ylabel("$z$ [$d_p$], moving with the cloud")
+    number = f"{particles:,}".replace(",", r"\,")
+    ax.set_title(
+        f"$n = {number}$, $\\varphi = ${phi_label(volume_fraction)}, "
+        f"$t = {frame.attrs['time']:.0f}\\,\\tau$"
+    )
+    figure.colorbar(
+        dots, ax=ax, shrink=0.93, pad=0.02, label=r"settling velocity $v_s / v_{s,\mathrm{Stokes}}$"
+    )
+    return figure
+
+
+def _picture(table, limits, attributes) -> Image.Image:
+    figure = cloud_picture(table, limits, attributes["volume_fraction"], int(attributes["n"]))
+    with mpl.rc_context({"savefig.dpi": DPI}):
+        figure.set_dpi(DPI)
+        figure.canvas.draw()
+    return Image.fromarray(np.asarray(figure.canvas.buffer_rgba())).convert("RGB")
