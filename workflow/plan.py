@@ -13,10 +13,12 @@ class Case(NamedTuple):
     volume_fraction: float
     galileo_multiple: float
     seed: int = 1
+    compared_model: str = ""
+    """Force model beside that of `sedimentation.model`."""
 
     @property
-    def name(self) -> str:
-        """Name that the files of the case have, like n1000_phi1e-03_ga1 or ..._ga1_seed2.
+    def start(self) -> str:
+        """Name of the random start, like n1000_phi1e-03_ga1 or ..._ga1_seed2: models share it.
 
         The first seed is not named: asking for more of them leaves the runs at hand as they are.
         """
@@ -25,6 +27,11 @@ class Case(NamedTuple):
         phi = f"{mantissa}e{int(exponent):+03d}"
         seed = f"_seed{self.seed}" if self.seed > 1 else ""
         return f"n{self.particles}_phi{phi}_ga{self.galileo_multiple:.15g}{seed}"
+
+    @property
+    def name(self) -> str:
+        """Name that the files of the case have: of the start, and of a model that is compared."""
+        return f"{self.start}_{self.compared_model}" if self.compared_model else self.start
 
 
 def shards(config: dict) -> list[str]:
@@ -73,6 +80,12 @@ def cases(config: dict) -> dict[str, Case]:
             Case(galileo["particles"], galileo["volume_fraction"], multiple)
             for multiple in galileo["multiples"]
         ),
+        *(
+            Case(min(settle["particles"]), phi, 1.0, compared_model=model)
+            for model in settle["models"]
+            if model != settle["model"]
+            for phi in settle["volume_fractions"]
+        ),
     ]
     seeds = range(1, settle["seeds"] + 1)
     return {
@@ -80,11 +93,16 @@ def cases(config: dict) -> dict[str, Case]:
     }
 
 
+def force_model(config: dict, case: str) -> str:
+    """Force model of a case."""
+    return cases(config)[case].compared_model or config["sedimentation"]["model"]
+
+
 def start_file(config: dict, case: str) -> str | list:
     """File that a case starts from, [] for none; {case} in its name stands for the case's name."""
     return config["sedimentation"]["start_file"].replace("{case}", case) or []
 
 
-def case_seed(config: dict, case: str) -> int:
-    """Seed of a case's start: it hangs on the campaign's seed and the name of the case alone."""
-    return crc32(f"{config['seed']} {case}".encode())
+def case_seed(config: dict, start: str) -> int:
+    """Seed of a case's start: it hangs on the campaign's seed and the name of the start alone."""
+    return crc32(f"{config['seed']} {start}".encode())

@@ -33,6 +33,8 @@ SETTLING = {
     "movie": 1,
     **STEADY,
 }
+# Three more cases have a model that no data were needed for.
+ALL_SETTLING = SETTLING | {"sedimentation": 10}
 FROM_DATA = {"dataset": 1, **DATA_FIGURES, **MODELS, **SETTLING}
 
 
@@ -83,12 +85,16 @@ def test_bits_of_the_data_hang_neither_on_cores_nor_on_shard_size(campaign, tmp_
             {"model": 1, "evaluation": 1, "figure_predicted_vs_target": 1},
         ),
         ("idnn={layers: [10/10, 20-20/20-20, 5/5]}", MODELS | SETTLING | {"sweep": 2, "model": 1}),
-        ("sedimentation={step: 0.05}", SETTLING),
+        ("sedimentation={step: 0.05}", ALL_SETTLING),
         (
             "sedimentation={galileo: {multiples: [1, 2, 3]}}",
             {"sedimentation": 1, "neighbour_changes": 1} | STEADY_TABLE | {"figure_voronoi_pdf": 1},
         ),
         ("sedimentation={statistics_from: 5}", STEADY),
+        (
+            "sedimentation={models: [rotne_prager, isolated]}",
+            {"sedimentation": 3, "neighbour_changes": 1} | STEADY_TABLE,
+        ),
         ("figures={samples: 500}", {"figure_force_scatter": 1, "figure_predicted_vs_target": 1}),
         ("figures={spectrum: welch}", {"figure_phase_and_spectra": 1}),
         ("figures={fit_frequencies: [0, 2]}", SPECTRA),
@@ -108,7 +114,7 @@ def test_an_edited_key_reruns_what_hangs_on_it_and_nothing_else(campaign, settin
         ("stokes/records.py", {"meshes": 3, "stokes": 3} | FROM_DATA),
         ("dataset.py", FROM_DATA),
         ("forces/training.py", MODELS | SETTLING),
-        ("sedimentation/dynamics.py", SETTLING),
+        ("sedimentation/dynamics.py", ALL_SETTLING),
         ("analysis/voronoi.py", {"figure_voronoi_pdf": 1, "figure_voronoi_variance": 1}),
         ("figures/mesh.py", {"figure_mesh_study": 1}),
         ("progress.py", {}),

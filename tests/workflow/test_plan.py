@@ -40,8 +40,8 @@ def test_the_paper_takes_the_expected_jobs_and_fewer_than_a_thousand(project):
         "winner": 1,
         "model": 3,
         "evaluation": 1,
-        # 3 numbers of particles, 6 volume fractions, and 2 more Galileo numbers
-        "sedimentation": 3 * 6 + 2,
+        # 3 numbers of particles, 6 volume fractions, 2 more Galileo numbers, 3 models to compare
+        "sedimentation": 3 * 6 + 2 + 3 * 6,
         "steady_state": 1,
         "independence_of_n": 1,
         "neighbour_changes": 1,
@@ -60,7 +60,7 @@ def test_figures_is_a_target_that_leaves_the_tables_out(project):
 
 
 def test_exports_is_a_target_with_every_case(project):
-    assert project.plan("--", "exports")["export"] == 3 * 6 + 2
+    assert project.plan("--", "exports")["export"] == 3 * 6 + 2 + 3 * 6
 
 
 @pytest.mark.parametrize(("number", "size"), [(120, 40), (121, 40), (119, 40), (120, 1000)])
@@ -90,8 +90,8 @@ def test_case_names_tell_cases_apart():
 
 
 def test_cases_of_the_galileo_series_are_added_once():
-    assert len(plan.cases(configure({}))) == 20
-    apart = configure({"sedimentation": {"galileo": {"particles": 500}}})
+    assert len(plan.cases(configure({"sedimentation": {"models": []}}))) == 20
+    apart = configure({"sedimentation": {"models": [], "galileo": {"particles": 500}}})
     assert len(plan.cases(apart)) == 21
 
 
@@ -125,8 +125,20 @@ def test_trial_names_are_file_names_and_lead_back_to_their_layers():
 
 
 def test_every_case_starts_from_its_own_random_numbers():
-    config = configure({})
-    seeds = [plan.case_seed(config, case) for case in plan.cases(config)]
+    config = configure({"sedimentation": {"models": []}})
+    seeds = [plan.case_seed(config, case.start) for case in plan.cases(config).values()]
     assert len(set(seeds)) == len(seeds)
-    assert seeds == [plan.case_seed(config, case) for case in plan.cases(config)]
+    assert seeds == [plan.case_seed(config, case.start) for case in plan.cases(config).values()]
     assert plan.case_seed(configure({"seed": 2}), "n1000_phi1e-03_ga1") not in seeds
+
+
+def test_compared_models_share_the_starts_of_the_smallest_cases():
+    config = configure({"sedimentation": {"models": ["isolated", "idnn"], "seeds": 2}})
+    cases = plan.cases(config)
+    compared = {name: case for name, case in cases.items() if case.compared_model}
+    assert len(compared) == 6 * 2
+    assert "n1000_phi1e-03_ga1_seed2_isolated" in compared
+    for name, case in compared.items():
+        assert case.start in cases
+        assert plan.force_model(config, name) == "isolated"
+        assert plan.force_model(config, case.start) == "idnn"

@@ -30,9 +30,12 @@ SHARDS = plan.shards(config)
 TRIALS = plan.trials(config)
 CASES = plan.cases(config)
 
-# The cases at the Galileo number of the properties; those of them with most particles, from dilute
-# to dense and from one start each; and the cases that differ in the Galileo number alone.
-PLAIN_CASES = [name for name, case in CASES.items() if case.galileo_multiple == 1]
+# The cases of `sedimentation.model` at the Galileo number of the properties; those of them with most
+# particles, from dilute to dense and from one start each; and the cases that differ in the Galileo
+# number alone.
+PLAIN_CASES = [
+    name for name, case in CASES.items() if case.galileo_multiple == 1 and not case.compared_model
+]
 LARGEST_CASES = [
     name
     for name in sorted(PLAIN_CASES, key=lambda name: CASES[name].volume_fraction)
@@ -43,7 +46,8 @@ LARGEST_CASES = [
 GALILEO_CASES = [
     name
     for name, case in CASES.items()
-    if case.particles == config["sedimentation"]["galileo"]["particles"]
+    if not case.compared_model
+    and case.particles == config["sedimentation"]["galileo"]["particles"]
     and case.volume_fraction == config["sedimentation"]["galileo"]["volume_fraction"]
 ]
 

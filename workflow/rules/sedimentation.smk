@@ -1,11 +1,11 @@
 rule sedimentation:
     """Let the particles of one case settle."""
     input:
-        model=branch(
-            config["sedimentation"]["model"] in LEARNED_MODELS,
-            then=f"results/model/{config['sedimentation']['model']}.safetensors",
-            otherwise=[],
-        ),
+        model=lambda wc: [
+            f"results/model/{model}.safetensors"
+            for model in LEARNED_MODELS
+            if model == plan.force_model(config, wc.case)
+        ],
         start=lambda wc: plan.start_file(config, wc.case),
         library=library("settle.py"),
     output:
@@ -20,8 +20,8 @@ rule sedimentation:
     resources:
         checkpoint_interval=config["sedimentation"]["checkpoint_interval"],
     params:
-        seed=lambda wc: plan.case_seed(config, wc.case),
-        model=config["sedimentation"]["model"],
+        seed=lambda wc: plan.case_seed(config, CASES[wc.case].start),
+        model=lambda wc: plan.force_model(config, wc.case),
         particles=lambda wc: CASES[wc.case].particles,
         volume_fraction=lambda wc: CASES[wc.case].volume_fraction,
         galileo_multiple=lambda wc: CASES[wc.case].galileo_multiple,
