@@ -98,9 +98,13 @@ def force_model(config: dict, case: str) -> str:
     return cases(config)[case].compared_model or config["sedimentation"]["model"]
 
 
-def start_file(config: dict, case: str) -> str | list:
-    """File that a case starts from, [] for none; {case} in its name stands for the case's name."""
-    return config["sedimentation"]["start_file"].replace("{case}", case) or []
+def start_file(config: dict, case: str) -> str | list[str]:
+    """File that a case starts from; {case} in its name stands for the name of the case.
+
+    Without one an empty list, which Snakemake takes for no input.
+    """
+    pattern = config["sedimentation"]["start_file"]
+    return pattern.replace("{case}", case) if pattern else []
 
 
 def case_seed(config: dict, start: str) -> int:

@@ -14,7 +14,7 @@ def neighbour_changes(runs: Iterable[xr.Dataset], start: float) -> pd.DataFrame:
 
     Parameters: `runs`, series datasets with new_neighbours (step), the share of particles whose set
     of five is another than a step ago, and only_fifth (step), the share of these in which only the
-    farthest changed (NaN in the table where a series lacks it); attribute step [tau].
+    farthest changed; attribute step [tau].
 
     Returns the columns model, n, volume_fraction, galileo, step, share, low, high (95 % interval,
     batch means), per_tau = share / step, and only_fifth, the share of all changes; sorted. Runs of
@@ -26,9 +26,8 @@ def neighbour_changes(runs: Iterable[xr.Dataset], start: float) -> pd.DataFrame:
         part = from_time(run, start, "step")
         mean = mean_with_interval(part["new_neighbours"].values)
         changes = part["new_neighbours"].values
-        only = np.nan
-        if changes.any() and "only_fifth" in part:
-            only = np.sum(changes * np.nan_to_num(part["only_fifth"].values)) / np.sum(changes)
+        fifth = np.nan_to_num(part["only_fifth"].values)
+        only = np.sum(changes * fifth) / np.sum(changes) if changes.any() else np.nan
         rows.append(
             case_of(run)
             | {

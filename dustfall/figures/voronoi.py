@@ -79,6 +79,7 @@ def voronoi_variance(frame: pd.DataFrame) -> Figure:
     ours = frame[frame["source"] == "steady state"]
     numbers = sorted(ours["n"].unique())
     for row in ours.itertuples():
+        size = numbers.index(row.n)
         ax.errorbar(
             row.inverse_beta,
             row.variance,
@@ -90,12 +91,15 @@ def voronoi_variance(frame: pd.DataFrame) -> Figure:
                 ]
             ),
             color=phi_colour(row.volume_fraction),
-            marker=MARKERS[numbers.index(row.n) % len(MARKERS)],
-            ms=5,
+            marker=MARKERS[size % len(MARKERS)],
+            mec="white",
+            mew=0.5,
+            ms=6,
             elinewidth=0.8,
             capsize=2,
             ls="none",
-            zorder=3,
+            # The largest cloud, which knows best, on top.
+            zorder=3 + 0.1 * size,
         )
     spheres = frame[frame["source"] == "random spheres"]
     for row in spheres.itertuples():

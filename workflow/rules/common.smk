@@ -54,6 +54,12 @@ GALILEO_CASES = [
 # Force models that are trained; the others need no file.
 LEARNED_MODELS = ["idnn", "dense", "anchored"]
 
+
+def trained(model):
+    """File of a force model that is trained; nothing of another."""
+    return f"results/model/{model}.safetensors" if model in LEARNED_MODELS else []
+
+
 FIGURES = expand(
     "results/figures/{figure}.{ending}",
     figure=[

@@ -1,11 +1,7 @@
 rule sedimentation:
     """Let the particles of one case settle."""
     input:
-        model=lambda wc: [
-            f"results/model/{model}.safetensors"
-            for model in LEARNED_MODELS
-            if model == plan.force_model(config, wc.case)
-        ],
+        model=lambda wc: trained(plan.force_model(config, wc.case)),
         start=lambda wc: plan.start_file(config, wc.case),
         library=library("settle.py"),
     output:

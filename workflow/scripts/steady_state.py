@@ -13,6 +13,7 @@ quantities = [
     "settling_velocity_mean",
     "settling_velocity_variance",
     "inverse_beta_mean",
+    "drag_mean",
     "new_neighbours",
 ]
 runs = [xr.load_dataset(path) for path in snakemake.input.series]
