@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 
 from dustfall.files import atomic
+from dustfall.scenes import LAWS
 
 NOT_CONVERGED = 1
 """Status of a scene that is left out (`stokes.many_body`, whose import would load its kernels)."""
@@ -121,18 +122,22 @@ def check(dataset: Dataset) -> None:
 
 
 def split(dataset: Dataset, share: float, seed: int) -> tuple[Dataset, Dataset]:
-    """Part the scenes at random into training and test scenes, `share` of all in the latter.
+    """Part the scenes at random into training and test scenes, `share` of each law in the latter.
 
-    Both keep the order of `dataset`. Raises ValueError if share lies outside ]0, 1[ or one part
-    would be empty.
+    Both keep the order of `dataset`; which scenes of a law are in which hangs on the seed and that
+    law alone. Raises ValueError if share lies outside ]0, 1[ or a part would lack a law.
     """
-    number = round(share * len(dataset))
-    if not (0 < share < 1 and 0 < number < len(dataset)):
-        raise ValueError(
-            f"a test share of {share} of {len(dataset)} scenes leaves no scene on one side"
-        )
     test = np.zeros(len(dataset), bool)
-    test[np.random.default_rng([seed, TEST_SCENES]).permutation(len(dataset))[:number]] = True
+    for law in np.unique(dataset.radial_law):
+        rows = np.flatnonzero(dataset.radial_law == law)
+        number = round(share * len(rows))
+        if not (0 < share < 1 and 0 < number < len(rows)):
+            raise ValueError(
+                f"a test share of {share} of {len(rows)} scenes of radial law {law} leaves no "
+                "scene on one side"
+            )
+        rng = np.random.default_rng([seed, TEST_SCENES, LAWS.index(law)])
+        test[rng.permutation(rows)[:number]] = True
     return dataset.select(~test), dataset.select(test)
 
 

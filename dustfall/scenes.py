@@ -4,9 +4,14 @@ import numpy as np
 
 NEIGHBOURS = 5
 
-LAWS = ("uniform", "ball")
-"""Radial laws: radii uniform between contact and the fifth distance (the law that reproduces the
-paper's statistics), or points uniform in the ball (a dilute random suspension)."""
+LAWS = ("uniform", "ball", "contact")
+"""Radial laws: `uniform`, radii uniform between contact and the fifth distance (the law that
+reproduces the paper's statistics); `ball`, points uniform in the ball (a dilute random suspension);
+`contact`, as `uniform`, but one neighbour nearly touches the reference sphere."""
+
+NEAR_CONTACT = (1e-3, 0.1)
+"""Gap [d_p] of the nearly touching neighbour of the law `contact`, uniform in this range: scenes
+that are rare under the other laws, and the hardest to predict."""
 
 _MOST_DRAWS = 10_000
 
@@ -43,12 +48,14 @@ def random_scene(seed: int, law: str, number: int, phi_range) -> tuple[np.ndarra
     phi = float(np.exp(rng.uniform(np.log(low), np.log(high))))
     d5 = float(fifth_distance(phi))
     placed = [np.zeros(3), d5 * _direction(rng)]
+    if law == "contact":
+        placed.append((1.0 + rng.uniform(*NEAR_CONTACT)) * _direction(rng))
     draws = 0
     while len(placed) <= NEIGHBOURS:
         draws += 1
         if draws > _MOST_DRAWS:
             raise ValueError(f"scene {number}: no room for five neighbours at phi = {phi:.3g}")
-        radius = rng.uniform(1.0, d5) if law == "uniform" else np.cbrt(rng.uniform(1.0, d5**3))
+        radius = np.cbrt(rng.uniform(1.0, d5**3)) if law == "ball" else rng.uniform(1.0, d5)
         candidate = radius * _direction(rng)
         if all(np.sum((candidate - other) ** 2) > 1.0 for other in placed):
             placed.append(candidate)

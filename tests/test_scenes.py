@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from dustfall.scenes import LAWS, fifth_distance, random_scene, random_scenes, volume_fraction
+from dustfall.scenes import (
+    LAWS,
+    NEAR_CONTACT,
+    fifth_distance,
+    random_scene,
+    random_scenes,
+    volume_fraction,
+)
 
 RANGE = (1e-8, 1e-3)
 
@@ -27,10 +34,14 @@ def test_scenes_follow_their_law(law):
     # Where there is much room, rejected overlaps do not show in the radii.
     dilute = d5 > 50
     inner, outer = distance[dilute, :4], d5[dilute, None]
-    if law == "uniform":
-        level = (inner - 1.0) / (outer - 1.0)
-    else:
+    if law == "contact":
+        low, high = NEAR_CONTACT
+        assert kstest((inner[:, 0] - 1.0 - low) / (high - low), "uniform").pvalue > 1e-3
+        inner = inner[:, 1:]
+    if law == "ball":
         level = (inner**3 - 1.0) / (outer**3 - 1.0)
+    else:
+        level = (inner - 1.0) / (outer - 1.0)
     assert kstest(level.ravel(), "uniform").pvalue > 1e-3
     directions = neighbours / distance[:, :, None]
     assert np.abs(directions.mean(axis=(0, 1))).max() < 4.0 / np.sqrt(3 * directions[..., 0].size)
@@ -55,7 +66,7 @@ def test_a_scene_hangs_on_seed_law_and_number_alone():
 
 
 def test_impossible_scenes_are_refused():
-    with pytest.raises(ValueError, match="allowed are uniform, ball"):
+    with pytest.raises(ValueError, match="allowed are uniform, ball, contact"):
         random_scene(1, "cube", 0, RANGE)
     for bad in ((1e-3, 1e-8), (0.0, 1e-3), (1e-8, 0.5)):
         with pytest.raises(ValueError, match="phi range"):

@@ -6,6 +6,7 @@ forces are in Re_p c_D, where an isolated sphere feels 24 along the flow.
 
 from dustfall.forces.frames import rotation_to_streamwise, spherical_coordinates
 from dustfall.forces.models import LearnedModel, load_model
+from dustfall.forces.reflections import Reflections
 from dustfall.forces.rotne_prager import IsolatedStokes, RotnePrager, rotne_prager_forces
 
 _TRAINING = {
@@ -22,6 +23,7 @@ __all__ = [
     "SETTINGS",
     "IsolatedStokes",
     "LearnedModel",
+    "Reflections",
     "RotnePrager",
     "TrainingSettings",
     "choose_winner",

@@ -16,7 +16,7 @@ from dustfall.forces.frames import (
     sort_by_distance,
     spherical_coordinates,
 )
-from dustfall.forces.rotne_prager import six_sphere_forces
+from dustfall.forces.reflections import reflected_forces
 
 COMPONENTS = {"streamwise": [1], "lateral": [0, 2]}
 """Columns of the force that each network predicts."""
@@ -31,7 +31,7 @@ class Kind:
     decomposed: blocks of the IDNN, else one dense block.
     ordered: neighbours sorted by distance, else taken as they are given.
     anchored: canonical frame, inputs 1/r, log r and the unit vector, and the residual of the
-    Rotne-Prager inverse; else flow frame, spherical coordinates and the deviation from Stokes drag.
+    reflections; else flow frame, spherical coordinates and the deviation from Stokes drag.
     """
 
     decomposed: bool
@@ -80,9 +80,9 @@ def describe(kind: str, neighbours: np.ndarray, radial_input: str, largest: floa
 
     `radial_input` is what spherical coordinates give for the distance: itself ("distance") or its
     natural logarithm. `largest` is the largest distance trained on: the networks see neighbours
-    beyond it there. The outputs fade as 1/distance: for the anchored kind each block's with the
-    distance of its (nearest) neighbour; for the others all with the nearest neighbour's, from
-    `largest` on. So a reference sphere whose neighbours all move away goes over into Stokes drag.
+    beyond it there. The outputs fade: for the anchored kind each block's as 1/distance^2 of its
+    (nearest) neighbour; for the others all as 1/distance of the nearest neighbour, from `largest`
+    on. So a reference sphere whose neighbours all move away goes over into Stokes drag.
     """
     layout = KINDS[kind]
     if layout.ordered:
@@ -91,7 +91,7 @@ def describe(kind: str, neighbours: np.ndarray, radial_input: str, largest: floa
     if layout.anchored:
         canonical, axes = canonical_frame(neighbours)
         inputs, envelope = _unit_vector_inputs(canonical, largest)
-        return Scenes(inputs, envelope, six_sphere_forces(neighbours), axes)
+        return Scenes(inputs, envelope, reflected_forces(neighbours), axes)
     baseline = np.zeros((len(neighbours), 3))
     baseline[:, 1] = STOKES_DRAG
     inputs = spherical_coordinates(neighbours)
@@ -116,8 +116,6 @@ def _unit_vector_inputs(neighbours, largest):
             inputs[m, j, 3] = y / distance
             inputs[m, j, 4] = z / distance
             # Neighbours 0 and 1 share a block and the envelope of the nearer one.
-            if j == 0:
-                envelope[m, 0] = CONTACT / distance
-            elif j > 1:
-                envelope[m, j - 1] = CONTACT / distance
+            if j != 1:
+                envelope[m, max(j - 1, 0)] = (CONTACT / distance) ** 2
     return inputs, envelope

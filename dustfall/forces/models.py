@@ -17,7 +17,7 @@ from dustfall.forces.frames import NEIGHBOURS, check_neighbours
 from dustfall.forces.inference import evaluate
 
 FORMAT = "dustfall force model"
-VERSION = 1
+VERSION = 2
 SHIPPED = Path(__file__).parent / "data" / "anchored.safetensors"
 
 ACTIVATION = {"streamwise": "relu", "lateral": "tanh"}
@@ -119,8 +119,8 @@ class LearnedModel:
     `history` holds, for a model just trained, the epochs and validation errors of each component.
 
     Out of range: a neighbour closer than contact is held at contact. Neighbours further away than
-    any in training are seen by the networks at that distance, and what the networks add fades as
-    1/distance, so that the force goes over into Stokes drag (see `features.describe`).
+    any in training are seen by the networks at that distance, and what the networks add fades
+    with distance, so that the force goes over into Stokes drag (see `features.describe`).
     """
 
     def __init__(self, header: dict, networks: dict[str, Network], history: dict | None = None):

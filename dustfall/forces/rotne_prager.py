@@ -1,13 +1,10 @@
 """Stokes drag of an isolated sphere, and of spheres coupled by the Rotne-Prager mobility."""
 
 import numpy as np
-from numba import njit
 
 from dustfall import STOKES_DRAG
-from dustfall.forces.frames import NEIGHBOURS, check_neighbours, hold_at_contact, sort_by_distance
-
-LANES = 64  # scenes that one pass of a kernel carries side by side, a whole vector of numbers each
-_SIZE = 3 * (NEIGHBOURS + 1)
+from dustfall.forces.frames import check_neighbours, hold_at_contact, sort_by_distance
+from dustfall.forces.six_spheres import TERMS, six_sphere_forces
 
 
 class IsolatedStokes:
@@ -41,7 +38,8 @@ class RotnePrager:
 
         Raises ValueError for neighbours of another shape, not finite, or at the centre.
         """
-        return six_sphere_forces(hold_at_contact(sort_by_distance(check_neighbours(neighbours))))
+        neighbours = hold_at_contact(sort_by_distance(check_neighbours(neighbours)))
+        return six_sphere_forces(neighbours, 0, np.zeros((2, TERMS)))
 
 
 def rotne_prager_forces(centres, flow=(0.0, 1.0, 0.0)) -> np.ndarray:
@@ -84,82 +82,3 @@ def _pair_mobility(distance):
     across = np.where(far, 0.375 / distance * (1 + 1 / (6 * square)), 1 - 0.5625 * distance)
     along = np.where(far, 0.375 / distance * (1 - 1 / (2 * square)), 0.1875 * distance)
     return across, along
-
-
-@njit(cache=True, fastmath={"contract"}, error_model="numpy")
-def six_sphere_forces(neighbours):
-    """Force (m, 3) on the reference sphere of scenes (m, 5, 3), see `RotnePrager`.
-
-    Cholesky factorisation of the 18x18 mobility with the reference sphere last, so that the back
-    substitution ends after three unknowns. The last index of every array runs over LANES
-    scenes, which the compiler turns into vector instructions.
-    """
-    count = neighbours.shape[0]
-    force = np.empty((count, 3))
-    centre = np.empty((NEIGHBOURS + 1, 3, LANES))
-    # The last row carries the flow: the factorisation then does the forward substitution as well.
-    factor = np.empty((_SIZE + 1, _SIZE, LANES))
-    solution = np.empty((3, LANES))
-    for start in range(0, count, LANES):
-        for lane in range(LANES):
-            m = min(start + lane, count - 1)
-            for k in range(3):
-                for j in range(NEIGHBOURS):
-                    centre[j, k, lane] = neighbours[m, j, k]
-                centre[NEIGHBOURS, k, lane] = 0.0
-        for i in range(NEIGHBOURS + 1):
-            for k in range(3):
-                for lane in range(LANES):
-                    factor[_SIZE, 3 * i + k, lane] = 1.0 if k == 1 else 0.0
-                for j in range(3):
-                    for lane in range(LANES):
-                        factor[3 * i + k, 3 * i + j, lane] = 1.0 if k == j else 0.0
-            for j in range(i):
-                _pair_block(factor, centre, i, j)
-        for j in range(_SIZE):
-            for i in range(j, _SIZE + 1):
-                for k in range(j):
-                    for lane in range(LANES):
-                        factor[i, j, lane] -= factor[i, k, lane] * factor[j, k, lane]
-                if i == j:
-                    for lane in range(LANES):
-                        factor[j, j, lane] = 1.0 / np.sqrt(factor[j, j, lane])
-                else:
-                    for lane in range(LANES):
-                        factor[i, j, lane] *= factor[j, j, lane]
-        for k in range(2, -1, -1):
-            row = _SIZE - 3 + k
-            for lane in range(LANES):
-                solution[k, lane] = factor[_SIZE, row, lane]
-            for j in range(k + 1, 3):
-                for lane in range(LANES):
-                    solution[k, lane] -= factor[_SIZE - 3 + j, row, lane] * solution[j, lane]
-            for lane in range(LANES):
-                solution[k, lane] *= factor[row, row, lane]
-        for lane in range(min(LANES, count - start)):
-            for k in range(3):
-                force[start + lane, k] = STOKES_DRAG * solution[k, lane]
-    return force
-
-
-@njit(cache=True, fastmath={"contract"}, error_model="numpy")
-def _pair_block(factor, centre, i, j):
-    for lane in range(LANES):
-        x = centre[i, 0, lane] - centre[j, 0, lane]
-        y = centre[i, 1, lane] - centre[j, 1, lane]
-        z = centre[i, 2, lane] - centre[j, 2, lane]
-        # The floor keeps the mobility of two coincident neighbours positive definite.
-        square = max(x * x + y * y + z * z, 1e-12)
-        distance = np.sqrt(square)
-        if square > 1.0:
-            across = 0.375 / distance * (1 + 1 / (6 * square))
-            along = 0.375 / (distance * square) * (1 - 1 / (2 * square))
-        else:
-            across = 1 - 0.5625 * distance
-            along = 0.1875 / distance
-        factor[3 * i, 3 * j, lane] = across + along * x * x
-        factor[3 * i + 1, 3 * j + 1, lane] = across + along * y * y
-        factor[3 * i + 2, 3 * j + 2, lane] = across + along * z * z
-        factor[3 * i, 3 * j + 1, lane] = factor[3 * i + 1, 3 * j, lane] = along * x * y
-        factor[3 * i, 3 * j + 2, lane] = factor[3 * i + 2, 3 * j, lane] = along * x * z
-        factor[3 * i + 1, 3 * j + 2, lane] = factor[3 * i + 2, 3 * j + 1, lane] = along * y * z

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dustfall.forces import RotnePrager
+from dustfall.forces import Reflections
 
 LAYERS = {"dense": "24-24", "idnn": "24-24/16-16", "anchored": "16-16/12-12"}
 
@@ -18,11 +18,11 @@ def random_neighbours(number, seed=0, nearest=1.0, farthest=397.0):
 
 
 def corrected_forces(neighbours):
-    """Rotne-Prager forces with a correction of each pair that has the symmetries of Stokes flow.
+    """Forces of the reflections with a correction of each pair that has the symmetries.
 
     Its form, r r / |r|^6, is that of the first term (stresslet reflected by the other sphere)
     that the Rotne-Prager mobility leaves out.
     """
     distance = np.linalg.norm(neighbours, axis=2, keepdims=True)
     correction = (neighbours[:, :, 1:2] * neighbours / distance**6).sum(axis=1)
-    return RotnePrager().predict(neighbours) - 4.0 * correction
+    return Reflections().predict(neighbours) - 4.0 * correction

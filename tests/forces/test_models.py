@@ -155,8 +155,8 @@ def test_damaged_files_are_refused(models, tmp_path):
 def test_files_of_another_version_are_refused(models, tmp_path):
     path = tmp_path / "model.safetensors"
     models["idnn"].save(path)
-    rewritten(path, lambda header, tensors: header.update(version=2))
-    with pytest.raises(ValueError, match=r"format version 2; this dustfall reads 1"):
+    rewritten(path, lambda header, tensors: header.update(version=1))
+    with pytest.raises(ValueError, match=r"format version 1; this dustfall reads 2"):
         load_model(path)
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import torch
 
-from dustfall.forces import PAPER_SETTINGS, RotnePrager, TrainingSettings, train_model
+from dustfall.forces import PAPER_SETTINGS, Reflections, TrainingSettings, train_model
 from tests.forces.scenes import LAYERS, corrected_forces, random_neighbours
 
 
@@ -16,11 +16,11 @@ def test_idnn_learns_the_streamwise_force_of_unseen_scenes(models):
     assert r2(models["idnn"].predict(neighbours)[:, 1], force[:, 1]) > 0.9
 
 
-def test_anchored_model_exceeds_the_rotne_prager_inverse_on_unseen_scenes(models):
+def test_anchored_model_exceeds_the_reflections_on_unseen_scenes(models):
     neighbours = random_neighbours(1000, seed=9)
     force = corrected_forces(neighbours)
     error = (models["anchored"].predict(neighbours) - force).std(axis=0)
-    baseline = (RotnePrager().predict(neighbours) - force).std(axis=0)
+    baseline = (Reflections().predict(neighbours) - force).std(axis=0)
     assert (error < 0.6 * baseline).all()
 
 
