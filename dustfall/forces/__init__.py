@@ -7,7 +7,12 @@ forces are in Re_p c_D, where an isolated sphere feels 24 along the flow.
 from dustfall.forces.frames import rotation_to_streamwise, spherical_coordinates
 from dustfall.forces.models import LearnedModel, load_model
 from dustfall.forces.reflections import Reflections
-from dustfall.forces.rotne_prager import IsolatedStokes, RotnePrager, rotne_prager_forces
+from dustfall.forces.rotne_prager import (
+    IsolatedStokes,
+    RotnePrager,
+    Stokeslets,
+    rotne_prager_forces,
+)
 
 _TRAINING = {
     "PAPER_SETTINGS": "training",
@@ -25,6 +30,7 @@ __all__ = [
     "LearnedModel",
     "Reflections",
     "RotnePrager",
+    "Stokeslets",
     "TrainingSettings",
     "choose_winner",
     "cross_validate",

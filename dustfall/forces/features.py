@@ -17,6 +17,7 @@ from dustfall.forces.frames import (
     spherical_coordinates,
 )
 from dustfall.forces.reflections import reflected_forces
+from dustfall.forces.rotne_prager import rotne_prager_inverse
 
 COMPONENTS = {"streamwise": [1], "lateral": [0, 2]}
 """Columns of the force that each network predicts."""
@@ -24,36 +25,56 @@ COMPONENTS = {"streamwise": [1], "lateral": [0, 2]}
 RADIAL_INPUTS = ("distance", "logarithm")
 
 
+USES = {
+    "dense": np.array([[0, 0, NEIGHBOURS]]),
+    "pairwise": np.array([[0, j, 1] for j in range(NEIGHBOURS)]),
+    "decomposed": np.array([[0, 0, 2], [1, 2, 1], [1, 3, 1], [1, 4, 1]]),
+}
+"""How the outputs of a network's blocks add up; each row one use: block, first neighbour, number
+of neighbours. Decomposed: F = F_12 + F_3 + F_4 + F_5 (paper, Fig. nnModel)."""
+
+
 @dataclass(frozen=True)
 class Kind:
     """A kind of learned model: which blocks, and which frame, inputs and baseline they stand on.
 
-    decomposed: blocks of the IDNN, else one dense block.
-    ordered: neighbours sorted by distance, else taken as they are given.
-    anchored: canonical frame, inputs 1/r, log r and the unit vector, and the residual of the
-    reflections; else flow frame, spherical coordinates and the deviation from Stokes drag.
+    blocks: a key of `USES`. ordered: neighbours sorted by distance, else taken as they are given.
+    unit_vectors: inputs 1/r, log r and the unit vector, else spherical coordinates.
+    canonical: canonical frame of the symmetries, else the flow's.
+    baseline: what the networks' output adds to, "stokes", "rotne_prager" or "reflections".
     """
 
-    decomposed: bool
-    ordered: bool
-    anchored: bool
+    blocks: str
+    ordered: bool = True
+    unit_vectors: bool = False
+    canonical: bool = False
+    baseline: str = "stokes"
 
 
 KINDS = {
-    "dense": Kind(decomposed=False, ordered=False, anchored=False),
-    "idnn": Kind(decomposed=True, ordered=True, anchored=False),
-    "anchored": Kind(decomposed=True, ordered=True, anchored=True),
+    "dense": Kind("dense", ordered=False),
+    "dense_sorted": Kind("dense"),
+    "pairwise": Kind("pairwise"),
+    "idnn": Kind("decomposed"),
+    "unit_vectors": Kind("decomposed", unit_vectors=True),
+    "canonical": Kind("decomposed", unit_vectors=True, canonical=True),
+    "residual": Kind("decomposed", unit_vectors=True, canonical=True, baseline="rotne_prager"),
+    "anchored": Kind("decomposed", unit_vectors=True, canonical=True, baseline="reflections"),
+    "anchored_pairwise": Kind(
+        "pairwise", unit_vectors=True, canonical=True, baseline="reflections"
+    ),
 }
-"""The paper's dense ANN (flat vector of unsorted neighbours), its IDNN, and the anchored IDNN."""
+"""The paper's dense ANN (flat vector of unsorted neighbours) and the same sorted; its first-order
+block alone (Seyed-Ahmadi & Wachs 2022); its IDNN; then, one change at a time, the anchored IDNN."""
 
 
 @dataclass(frozen=True)
 class Scenes:
     """Scenes as a network takes them.
 
-    inputs: (m, 5, F), not yet normalised. envelope: (m, 4), weights of the second-order block and
-    of neighbours 3 to 5 in the first-order block. baseline: (m, 3), force in the flow frame that
-    the network's output adds to. axes: (m, 2, 2), lateral axes of the frame of that output.
+    inputs: (m, 5, F), not yet normalised. envelope: (m, uses), weight of each use of a block.
+    baseline: (m, 3), force in the flow frame that the network's output adds to. axes: (m, 2, 2),
+    lateral axes of the frame of that output, where it is not the flow's.
     """
 
     inputs: np.ndarray
@@ -80,32 +101,44 @@ def describe(kind: str, neighbours: np.ndarray, radial_input: str, largest: floa
 
     `radial_input` is what spherical coordinates give for the distance: itself ("distance") or its
     natural logarithm. `largest` is the largest distance trained on: the networks see neighbours
-    beyond it there. The outputs fade: for the anchored kind each block's as 1/distance^2 of its
-    (nearest) neighbour; for the others all as 1/distance of the nearest neighbour, from `largest`
-    on. So a reference sphere whose neighbours all move away goes over into Stokes drag.
+    beyond it there. The outputs fade, so that a reference sphere whose neighbours all move away
+    goes over into Stokes drag: with spherical coordinates as 1/distance of the nearest neighbour,
+    from `largest` on; with unit vectors each use as 1/distance of its (nearest) neighbour, and
+    squared on the reflections, whose error falls sooner.
     """
     layout = KINDS[kind]
     if layout.ordered:
         neighbours = sort_by_distance(neighbours)
     neighbours = hold_at_contact(neighbours)
-    if layout.anchored:
-        canonical, axes = canonical_frame(neighbours)
-        inputs, envelope = _unit_vector_inputs(canonical, largest)
-        return Scenes(inputs, envelope, reflected_forces(neighbours), axes)
-    baseline = np.zeros((len(neighbours), 3))
-    baseline[:, 1] = STOKES_DRAG
-    inputs = spherical_coordinates(neighbours)
-    fade = np.minimum(1.0, largest / inputs[:, :, 0].min(axis=1))
-    radius = np.minimum(inputs[:, :, 0], largest)
-    inputs[:, :, 0] = np.log(radius) if radial_input == "logarithm" else radius
-    return Scenes(inputs, np.repeat(fade[:, None], NEIGHBOURS - 1, axis=1), baseline, None)
+    seen, axes = canonical_frame(neighbours) if layout.canonical else (neighbours, None)
+    first = USES[layout.blocks][:, 1]
+    if layout.unit_vectors:
+        inputs = _unit_vectors(seen, largest)
+        power = 2 if layout.baseline == "reflections" else 1
+        envelope = inputs[:, first, 0] ** power
+    else:
+        inputs = spherical_coordinates(seen)
+        fade = np.minimum(1.0, largest / inputs[:, :, 0].min(axis=1))
+        radius = np.minimum(inputs[:, :, 0], largest)
+        inputs[:, :, 0] = np.log(radius) if radial_input == "logarithm" else radius
+        envelope = np.repeat(fade[:, None], len(first), axis=1)
+    return Scenes(inputs, envelope, _baseline(layout.baseline, neighbours), axes)
+
+
+def _baseline(name, neighbours):
+    if name == "reflections":
+        return reflected_forces(neighbours)
+    if name == "rotne_prager":
+        return rotne_prager_inverse(neighbours)
+    force = np.zeros((len(neighbours), 3))
+    force[:, 1] = STOKES_DRAG
+    return force
 
 
 @njit(cache=True)
-def _unit_vector_inputs(neighbours, largest):
+def _unit_vectors(neighbours, largest):
     count = neighbours.shape[0]
     inputs = np.empty((count, NEIGHBOURS, 5))
-    envelope = np.empty((count, NEIGHBOURS - 1))
     for m in range(count):
         for j in range(NEIGHBOURS):
             x, y, z = neighbours[m, j, 0], neighbours[m, j, 1], neighbours[m, j, 2]
@@ -115,7 +148,4 @@ def _unit_vector_inputs(neighbours, largest):
             inputs[m, j, 2] = x / distance
             inputs[m, j, 3] = y / distance
             inputs[m, j, 4] = z / distance
-            # Neighbours 0 and 1 share a block and the envelope of the nearer one.
-            if j != 1:
-                envelope[m, max(j - 1, 0)] = (CONTACT / distance) ** 2
-    return inputs, envelope
+    return inputs

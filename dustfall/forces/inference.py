@@ -10,14 +10,13 @@ _LARGEST = 18.0  # tanh of it is one to 5e-16
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
-def evaluate(inputs, envelope, mean, scale, parameters, widths, applications, bounded, outputs):
+def evaluate(inputs, envelope, mean, scale, parameters, widths, uses, bounded, outputs):
     """Return the network's output (m, outputs) in units of its target's scale.
 
-    inputs (m, 5, F) with their `mean` and `scale` (F,); envelope (m, 4); `parameters`, one vector
-    per block (rows of a matrix, padded): each layer's weights (out, in) and biases (out,) in turn;
-    `widths` (blocks, layers + 1), padded with zeros; `applications` (a, 4), each row one use of a
-    block: block, first neighbour, number of neighbours, column of the envelope. `bounded` tells
-    tanh from ReLU.
+    inputs (m, 5, F) with their `mean` and `scale` (F,); envelope (m, uses); `parameters`, one
+    vector per block (rows of a matrix, padded): each layer's weights (out, in) and biases (out,);
+    `widths` (blocks, layers + 1), padded with zeros; `uses` (uses, 3), each row one use of a block:
+    block, first neighbour, number of neighbours. `bounded` tells tanh from ReLU.
     """
     count, _, features = inputs.shape
     result = np.zeros((count, outputs))
@@ -25,8 +24,8 @@ def evaluate(inputs, envelope, mean, scale, parameters, widths, applications, bo
     layer = np.empty((largest, LANES))
     following = np.empty((largest, LANES))
     for start in range(0, count, LANES):
-        for use in range(applications.shape[0]):
-            block, first, number, column = applications[use]
+        for use in range(uses.shape[0]):
+            block, first, number = uses[use]
             for j in range(number):
                 for k in range(features):
                     for lane in range(LANES):
@@ -52,7 +51,7 @@ def evaluate(inputs, envelope, mean, scale, parameters, widths, applications, bo
                 layer, following = following, layer
             for lane in range(min(LANES, count - start)):
                 for o in range(outputs):
-                    result[start + lane, o] += envelope[start + lane, column] * layer[o, lane]
+                    result[start + lane, o] += envelope[start + lane, use] * layer[o, lane]
     return result
 
 

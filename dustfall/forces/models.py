@@ -12,8 +12,8 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save_file
 
 from dustfall.files import atomic
-from dustfall.forces.features import COMPONENTS, KINDS, RADIAL_INPUTS, describe
-from dustfall.forces.frames import NEIGHBOURS, check_neighbours
+from dustfall.forces.features import COMPONENTS, KINDS, RADIAL_INPUTS, USES, describe
+from dustfall.forces.frames import check_neighbours
 from dustfall.forces.inference import evaluate
 
 FORMAT = "dustfall force model"
@@ -25,24 +25,20 @@ ACTIVATION = {"streamwise": "relu", "lateral": "tanh"}
 
 INPUTS = {False: 3, True: 5}  # numbers a neighbour: spherical coordinates; 1/r, log r, unit vector
 
-# Each row: block, first neighbour, number of neighbours, column of the envelope.
-_APPLICATIONS = {
-    False: np.array([[0, 0, NEIGHBOURS, 0]]),
-    True: np.array([[0, 0, 2, 0], [1, 2, 1, 1], [1, 3, 1, 2], [1, 4, 1, 3]]),
-}
-
 
 def parse_layers(layers: str, kind: str) -> list[list[int]]:
     """Return the hidden widths of each block: "40-40/30-30-30" -> [[40, 40], [30, 30, 30]].
 
-    An IDNN has two blocks, second order / first order; a dense network has one, as in "60-60".
+    An IDNN has two blocks, second order / first order; a dense or pairwise network has one, as in
+    "60-60".
     Raises ValueError for an unknown kind, another number of blocks, or a width below one.
     """
     if kind not in KINDS:
         raise ValueError(f"kind is {kind!r}; it must be one of {', '.join(KINDS)}")
     blocks = layers.split("/") if isinstance(layers, str) else []
     widths = [block.split("-") for block in blocks]
-    expected, example = (2, "40-40/30-30-30") if KINDS[kind].decomposed else (1, "60-60")
+    decomposed = KINDS[kind].blocks == "decomposed"
+    expected, example = (2, "40-40/30-30-30") if decomposed else (1, "60-60")
     if len(widths) != expected or not all(
         width.isascii() and width.isdigit() and int(width) > 0 for row in widths for width in row
     ):
@@ -53,10 +49,10 @@ def parse_layers(layers: str, kind: str) -> list[list[int]]:
 def block_widths(kind: str, layers: str, component: str) -> list[list[int]]:
     """Return each block's widths from its inputs over the hidden layers to its outputs."""
     layout = KINDS[kind]
-    neighbours = (2, 1) if layout.decomposed else (NEIGHBOURS,)
+    seen = {block: number for block, _, number in USES[layout.blocks].tolist()}
     return [
-        [number * INPUTS[layout.anchored], *hidden, len(COMPONENTS[component])]
-        for number, hidden in zip(neighbours, parse_layers(layers, kind), strict=True)
+        [seen[block] * INPUTS[layout.unit_vectors], *hidden, len(COMPONENTS[component])]
+        for block, hidden in enumerate(parse_layers(layers, kind))
     ]
 
 
@@ -64,11 +60,13 @@ def block_widths(kind: str, layers: str, component: str) -> list[list[int]]:
 class Network:
     """Trained weights of one component's network.
 
-    blocks: per block, per layer, the weight (out, in) and the bias (out,), the last layer without
-    bias. mean and scale (F,) normalise the inputs; `unit` is the size of the output in Re_p c_D.
+    uses: how its blocks are used, a value of `USES`. blocks: per block, per layer, the weight
+    (out, in) and the bias (out,), the last layer without bias. mean and scale (F,) normalise the
+    inputs; `unit` is the size of the output in Re_p c_D.
     """
 
     component: str
+    uses: np.ndarray
     blocks: list[list[tuple[np.ndarray, ...]]]
     mean: np.ndarray
     scale: np.ndarray
@@ -80,7 +78,7 @@ class Network:
         return sum(array.size for block in self.blocks for layer in block for array in layer)
 
     def residual(self, inputs: np.ndarray, envelope: np.ndarray) -> np.ndarray:
-        """Return the output (m, 1 or 2) in Re_p c_D for inputs (m, 5, F) and envelope (m, 4)."""
+        """Return the output (m, 1 or 2) in Re_p c_D for inputs (m, 5, F), envelope (m, uses)."""
         parameters, widths = self._packed
         return self.unit * evaluate(
             inputs,
@@ -89,7 +87,7 @@ class Network:
             self.scale,
             parameters,
             widths,
-            _APPLICATIONS[len(self.blocks) == 2],
+            self.uses,
             ACTIVATION[self.component] == "tanh",
             len(COMPONENTS[self.component]),
         )
@@ -113,7 +111,7 @@ class Network:
 
 
 class LearnedModel:
-    """A dense ANN, an IDNN or an anchored IDNN with its trained networks.
+    """A force model of one of the `KINDS`, with its trained networks.
 
     `header` describes the model in plain values (kind, layers, inputs, units, frame, training);
     `history` holds, for a model just trained, the epochs and validation errors of each component.
@@ -130,7 +128,7 @@ class LearnedModel:
 
     @property
     def name(self) -> str:
-        """Kind of the model: dense, idnn or anchored."""
+        """Kind of the model, as in `KINDS`."""
         return self.header["kind"]
 
     def predict(self, neighbours) -> np.ndarray:
@@ -229,9 +227,11 @@ def _network(tensors, header, component):
                 layer += (tensor(f"{number}.{index}.bias", narrow),)
             layers.append(layer)
         blocks.append(layers)
-    features = INPUTS[KINDS[header["kind"]].anchored]
+    layout = KINDS[header["kind"]]
+    features = INPUTS[layout.unit_vectors]
     mean, scale = tensor("mean", features), tensor("scale", features)
-    return Network(component, blocks, mean, scale, float(tensor("unit", 1)[0]))
+    unit = float(tensor("unit", 1)[0])
+    return Network(component, USES[layout.blocks], blocks, mean, scale, unit)
 
 
 def _checksum(tensors):

@@ -5,6 +5,7 @@ from itertools import pairwise
 import torch
 from torch import nn
 
+from dustfall.forces.features import KINDS, USES
 from dustfall.forces.models import ACTIVATION, block_widths
 
 
@@ -26,34 +27,23 @@ class Block(nn.Sequential):
         super().__init__(*layers, output)
 
 
-class DenseNetwork(nn.Module):
-    """One block that sees the inputs of all five neighbours at once, as a flat vector."""
+class BlockSum(nn.Module):
+    """Sum of the blocks' outputs over their uses (a value of `features.USES`), each weighted."""
 
-    def __init__(self, block: Block):
+    def __init__(self, blocks: list[Block], uses):
         super().__init__()
-        self.blocks = nn.ModuleList([block])
+        self.blocks = nn.ModuleList(blocks)
+        self.uses = uses.tolist()
 
     def forward(self, inputs: torch.Tensor, envelope: torch.Tensor) -> torch.Tensor:
-        """Map normalised inputs (b, 5, F) and envelope (b, 4) to (b, 1 or 2)."""
-        return self.blocks[0](inputs.flatten(1)) * envelope[:, :1]
-
-
-class InteractionDecomposedNetwork(nn.Module):
-    """IDNN: F = F_12 + F_3 + F_4 + F_5 (paper, Fig. nnModel).
-
-    The second-order block sees the two nearest neighbours together; the first-order block, with the
-    same weights for each, sees the other three one at a time.
-    """
-
-    def __init__(self, second: Block, first: Block):
-        super().__init__()
-        self.blocks = nn.ModuleList([second, first])
-
-    def forward(self, inputs: torch.Tensor, envelope: torch.Tensor) -> torch.Tensor:
-        """Map normalised inputs (b, 5, F) and envelope (b, 4) to (b, 1 or 2)."""
-        second, first = self.blocks
-        nearest = second(inputs[:, :2].flatten(1)) * envelope[:, :1]
-        return nearest + (first(inputs[:, 2:]) * envelope[:, 1:, None]).sum(1)
+        """Map normalised inputs (b, 5, F) and envelope (b, uses) to (b, 1 or 2)."""
+        total = 0.0
+        for number, block in enumerate(self.blocks):
+            rows = [row for row, use in enumerate(self.uses) if use[0] == number]
+            seen = [inputs[:, first : first + n].flatten(1) for _, first, n in self.uses]
+            outputs = block(torch.stack([seen[row] for row in rows], dim=1))
+            total = total + (outputs * envelope[:, rows, None]).sum(1)
+        return total
 
 
 def build(kind: str, layers: str, component: str, generator: torch.Generator) -> nn.Module:
@@ -62,4 +52,4 @@ def build(kind: str, layers: str, component: str, generator: torch.Generator) ->
         Block(widths, ACTIVATION[component], generator)
         for widths in block_widths(kind, layers, component)
     ]
-    return InteractionDecomposedNetwork(*blocks) if len(blocks) == 2 else DenseNetwork(*blocks)
+    return BlockSum(blocks, USES[KINDS[kind].blocks])

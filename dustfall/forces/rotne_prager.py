@@ -10,7 +10,7 @@ from dustfall.forces.six_spheres import TERMS, six_sphere_forces
 class IsolatedStokes:
     """Stokes drag without neighbours: 24 Re_p c_D along the flow."""
 
-    name = "stokes"
+    name = "isolated"
 
     def predict(self, neighbours) -> np.ndarray:
         """Return the force (m, 3) in Re_p c_D for neighbours (m, 5, 3) in d_p.
@@ -20,6 +20,29 @@ class IsolatedStokes:
         force = np.zeros((len(check_neighbours(neighbours)), 3))
         force[:, 1] = STOKES_DRAG
         return force
+
+
+class Stokeslets:
+    """Superposed disturbances: the reference sphere in the flow of five isolated neighbours.
+
+    Each neighbour drags the fluid as a point force of Stokes drag: F = 24 (U - sum of
+    3/8 (1 + n n)/r . U), first order in 1/r, nothing reflected. Far too low, even negative, where
+    several neighbours are close.
+    """
+
+    name = "stokeslets"
+
+    def predict(self, neighbours) -> np.ndarray:
+        """Return the force (m, 3) in Re_p c_D for neighbours (m, 5, 3) in d_p, any order.
+
+        A neighbour closer than contact is held at contact. Raises ValueError for neighbours of
+        another shape, not finite, or at the centre.
+        """
+        neighbours = hold_at_contact(sort_by_distance(check_neighbours(neighbours)))
+        distance = np.linalg.norm(neighbours, axis=2, keepdims=True)
+        disturbance = neighbours[:, :, 1:2] * neighbours / distance**3
+        disturbance[:, :, 1] += 1 / distance[:, :, 0]
+        return STOKES_DRAG * (np.array([0.0, 1.0, 0.0]) - 0.375 * disturbance.sum(axis=1))
 
 
 class RotnePrager:
@@ -38,8 +61,12 @@ class RotnePrager:
 
         Raises ValueError for neighbours of another shape, not finite, or at the centre.
         """
-        neighbours = hold_at_contact(sort_by_distance(check_neighbours(neighbours)))
-        return six_sphere_forces(neighbours, 0, np.zeros((2, TERMS)))
+        return rotne_prager_inverse(hold_at_contact(sort_by_distance(check_neighbours(neighbours))))
+
+
+def rotne_prager_inverse(neighbours: np.ndarray) -> np.ndarray:
+    """Force (m, 3) of sorted neighbours (m, 5, 3) that are no closer than contact."""
+    return six_sphere_forces(neighbours, 0, np.zeros((2, TERMS)))
 
 
 def rotne_prager_forces(centres, flow=(0.0, 1.0, 0.0)) -> np.ndarray:

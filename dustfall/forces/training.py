@@ -10,7 +10,7 @@ import torch
 from torch import nn
 
 from dustfall import __version__
-from dustfall.forces.features import COMPONENTS, KINDS, RADIAL_INPUTS, Scenes, describe
+from dustfall.forces.features import COMPONENTS, KINDS, RADIAL_INPUTS, USES, Scenes, describe
 from dustfall.forces.frames import NEIGHBOURS, check_neighbours
 from dustfall.forces.models import FORMAT, VERSION, LearnedModel, Network, parse_layers
 from dustfall.forces.networks import build
@@ -58,12 +58,13 @@ class TrainingSettings:
 
 
 SETTINGS = {
-    "dense": TrainingSettings(),
-    "idnn": TrainingSettings(),
-    "anchored": TrainingSettings(batch_size=256, epochs=100, learning_rate=3e-3),
+    kind: TrainingSettings()
+    if layout.baseline == "stokes"
+    else TrainingSettings(batch_size=256, epochs=100, learning_rate=3e-3)
+    for kind, layout in KINDS.items()
 }
 """Settings that reach each kind's plateau soonest on 12,600 samples (about 20 core-seconds a
-component). The anchored kind overfits at the rate that the others need."""
+component). On a baseline networks overfit at the rate that the others need."""
 
 PAPER_SETTINGS = TrainingSettings(
     batch_size=0,
@@ -102,7 +103,7 @@ def fit(
 ) -> tuple[list[int], list[float]]:
     """Train `network` in place and leave it at its best validation error.
 
-    `tensors` are the normalised inputs (m, 5, F), the envelope (m, 4) and the target (m, 1 or 2);
+    `tensors` are the normalised inputs (m, 5, F), envelope (m, uses) and target (m, 1 or 2);
     `training` and `validation` are rows of them. `report(epoch)` is called after each epoch.
     Returns the validated epochs and their mean squared errors, in the target's unit. Raises
     FloatingPointError when no validation error was finite.
@@ -155,12 +156,12 @@ def train_model(
 ) -> LearnedModel:
     """Train both components of a force model.
 
-    Parameters: `kind` dense, idnn or anchored; `neighbours` (m, 5, 3) in d_p; `force` (m, 3) in
-    Re_p c_D; `layers` hidden widths as in "40-40/30-30-30" (one block for dense); `settings` by
-    default those of `SETTINGS`; `radial_input` what the spherical coordinates give for the
-    distance, "distance" or "logarithm" (the anchored kind has 1/r and log r). One sample in ten,
-    drawn from the seed, is kept for validation. The same arguments give the same bits on one
-    machine. `progress(done, total)` counts epochs.
+    Parameters: `kind` one of `KINDS`; `neighbours` (m, 5, 3) in d_p; `force` (m, 3) in
+    Re_p c_D; `layers` hidden widths as in "40-40/30-30-30" (dense and pairwise: one block);
+    `settings` by default those of `SETTINGS`; `radial_input` what the spherical coordinates give
+    for the distance, "distance" or "logarithm" (unit vectors come with 1/r and log r). One sample
+    in ten, drawn from the seed, is kept for validation. The same arguments give the same bits on
+    one machine. `progress(done, total)` counts epochs.
 
     Raises ValueError for arguments out of range and FloatingPointError when training diverges.
     """
@@ -193,14 +194,12 @@ def train_model(
         "radial_input": radial_input,
         "largest_distance": largest,
         "inputs": "1/r, log r and unit vector of each neighbour, normalised"
-        if layout.anchored
+        if layout.unit_vectors
         else f"{radial_input} (r), azimuth and polar angle of each neighbour, normalised",
         "frame": "canonical frame of the symmetries"
-        if layout.anchored
+        if layout.canonical
         else "flow: x spanwise, y streamwise, z vertical; polar axis z, azimuth from x to y",
-        "baseline": "Rotne-Prager mobility inverse, reflected dipoles, exact pairs"
-        if layout.anchored
-        else "isolated Stokes drag",
+        "baseline": layout.baseline,
         "units": {"length": "d_p", "force": "Re_p c_D"},
         "training": {
             "samples": len(neighbours),
@@ -263,7 +262,7 @@ def train_component(
         for block in network.blocks
     ]
     history = History(epochs, [error * unit**2 for error in errors])
-    return Network(component, blocks, mean, scale, unit), history
+    return Network(component, USES[KINDS[kind].blocks], blocks, mean, scale, unit), history
 
 
 def score(

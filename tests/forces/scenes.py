@@ -4,7 +4,13 @@ import numpy as np
 
 from dustfall.forces import Reflections
 
-LAYERS = {"dense": "24-24", "idnn": "24-24/16-16", "anchored": "16-16/12-12"}
+LAYERS = {
+    "dense": "24-24",
+    "dense_sorted": "24-24",
+    "pairwise": "16-16",
+    "idnn": "24-24/16-16",
+    "anchored": "16-16/12-12",
+}
 
 
 def random_neighbours(number, seed=0, nearest=1.0, farthest=397.0):

@@ -43,7 +43,7 @@ def test_a_scene_has_the_same_force_in_any_batch(models, kind):
     np.testing.assert_array_equal(together, alone)
 
 
-@pytest.mark.parametrize("kind", ["idnn", "anchored"])
+@pytest.mark.parametrize("kind", ["dense_sorted", "pairwise", "idnn", "anchored"])
 def test_order_of_neighbours_does_not_matter(models, kind):
     neighbours = random_neighbours(50)
     expected = models[kind].predict(neighbours)

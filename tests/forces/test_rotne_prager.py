@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from dustfall.forces import IsolatedStokes, RotnePrager, rotne_prager_forces
+from dustfall.forces import IsolatedStokes, RotnePrager, Stokeslets, rotne_prager_forces
 from tests.forces.scenes import random_neighbours
 
 # Exact force / isolated Stokes drag of two fixed equal spheres at s = 20 radii
@@ -87,3 +87,15 @@ def test_empty_batch_gives_no_forces():
 def test_impossible_centres_are_refused(centres, message):
     with pytest.raises(ValueError, match=message):
         rotne_prager_forces(centres)
+
+
+def test_stokeslets_superpose_the_first_order_of_each_pair():
+    neighbours = 1e3 * random_neighbours(10)
+    one = []
+    for j in range(5):
+        alone = 1e12 * np.ones((10, 5, 3)) * np.arange(1, 6)[:, None]
+        alone[:, j] = neighbours[:, j]
+        one.append(RotnePrager().predict(alone) - [0, 24, 0])
+    difference = Stokeslets().predict(neighbours) - [0, 24, 0] - sum(one)
+    distance = np.linalg.norm(neighbours, axis=2).min(axis=1)
+    assert (np.abs(difference).max(axis=1) < 24 / distance**2).all()

@@ -1,0 +1,126 @@
+"""How well force models predict: scores, errors near contact, broken symmetries, cost."""
+
+import time
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+
+from dustfall.analysis.correlations import coefficient_of_determination
+from dustfall.analysis.distributions import decades
+from dustfall.dataset import Dataset
+from dustfall.forces.features import COMPONENTS
+
+ANGLE = 1.0
+"""Turn about the flow axis [rad] that `symmetry_violations` tries: no part of a full turn."""
+
+
+def scores(predictions: Mapping[str, np.ndarray], test: Dataset) -> pd.DataFrame:
+    """Tabulate R^2, RMS and largest error of each model, by radial law and decade of phi.
+
+    predictions: name -> force (m, 3) [Re_p c_D] on the scenes of `test`.
+
+    Returns the columns model, component, radial_law, phi_low, phi_high, samples, r2 (of both
+    components of "lateral" together; NaN where the force does not vary), rms_error and
+    largest_error [Re_p c_D]. The first rows of each law are those of all its decades.
+    """
+    rows = []
+    for law in dict.fromkeys(test.radial_law):
+        own = test.radial_law == law
+        phi = test.volume_fraction[own]
+        groups = [(phi.min(), phi.max(), np.ones(len(phi), bool)), *decades(phi)]
+        for low, high, inside in groups:
+            chosen = np.flatnonzero(own)[inside]
+            for model, predicted in predictions.items():
+                for component, columns in COMPONENTS.items():
+                    target = test.force[chosen][:, columns]
+                    error = predicted[chosen][:, columns] - target
+                    rows.append(
+                        {
+                            "model": model,
+                            "component": component,
+                            "radial_law": law,
+                            "phi_low": low,
+                            "phi_high": high,
+                            "samples": len(chosen),
+                            "r2": coefficient_of_determination(target, target + error)
+                            if np.ptp(target) > 0
+                            else np.nan,
+                            "rms_error": np.sqrt((error**2).mean()),
+                            "largest_error": np.abs(error).max(),
+                        }
+                    )
+    return pd.DataFrame(rows)
+
+
+def error_by_distance(
+    predictions: Mapping[str, np.ndarray], test: Dataset, bins: int = 24
+) -> pd.DataFrame:
+    """Tabulate the error of each model against the gap to the nearest neighbour.
+
+    The scenes, sorted by gap, are cut into `bins` of equal number. Returns the columns model, gap
+    (median of the bin) [d_p], samples, rms_error (of the force vector) and largest_error (of its
+    length) [Re_p c_D].
+    """
+    gap = np.linalg.norm(test.neighbours, axis=2).min(axis=1) - 1.0
+    parts = [part for part in np.array_split(np.argsort(gap, kind="stable"), bins) if len(part)]
+    rows = []
+    for model, predicted in predictions.items():
+        error = np.linalg.norm(predicted - test.force, axis=1)
+        rows += [
+            {
+                "model": model,
+                "gap": np.median(gap[part]),
+                "samples": len(part),
+                "rms_error": np.sqrt((error[part] ** 2).mean()),
+                "largest_error": error[part].max(),
+            }
+            for part in parts
+        ]
+    return pd.DataFrame(rows)
+
+
+def symmetry_violations(models, neighbours: np.ndarray) -> pd.DataFrame:
+    """Measure how far models break the symmetries of Stokes flow.
+
+    models: objects with `name` and `predict`; neighbours (m, 5, 3) [d_p].
+
+    Turned about the flow axis or mirrored through it, a scene has its force turned or mirrored;
+    inverted through the reference sphere it keeps its force. Returns the columns model, symmetry
+    ("rotation", "mirror", "inversion"), rms and largest: of the length of the difference between
+    the force of the image and the image of the force [Re_p c_D].
+    """
+    c, s = np.cos(ANGLE), np.sin(ANGLE)
+    rotation = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+    mirror = np.diag([-1.0, 1.0, 1.0])
+    images = {
+        "rotation": (rotation, rotation),
+        "mirror": (mirror, mirror),
+        "inversion": (-np.eye(3), np.eye(3)),
+    }
+    rows = []
+    for model in models:
+        force = model.predict(neighbours)
+        for symmetry, (of_scene, of_force) in images.items():
+            image = model.predict(neighbours @ of_scene.T)
+            difference = np.linalg.norm(image - force @ of_force.T, axis=1)
+            rows.append(
+                {
+                    "model": model.name,
+                    "symmetry": symmetry,
+                    "rms": np.sqrt((difference**2).mean()),
+                    "largest": difference.max(),
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def prediction_cost(model, neighbours: np.ndarray, repetitions: int = 5) -> float:
+    """Processor time of a prediction [microseconds a scene], the best of some repetitions."""
+    model.predict(neighbours[:1])
+    best = np.inf
+    for _ in range(repetitions):
+        start = time.process_time()
+        model.predict(neighbours)
+        best = min(best, time.process_time() - start)
+    return 1e6 * best / len(neighbours)
