@@ -52,6 +52,7 @@ rule all:
         "results/model/evaluation.csv",
         "results/analysis/independence_of_n.csv",
         "results/analysis/neighbour_changes.csv",
+        "results/model/ablation.csv",
         FIGURES,
 
 

@@ -52,6 +52,14 @@ class Dataset:
         """The scenes that an index array or a mask names."""
         return Dataset(*(getattr(self, field.name)[which] for field in fields(self)))
 
+    def of_laws(self, laws: Iterable[str]) -> "Dataset":
+        """The scenes of some radial laws. Raises ValueError if there are none."""
+        laws = list(laws)
+        which = np.isin(self.radial_law, laws)
+        if not which.any():
+            raise ValueError(f"the data set has no scenes of radial law {', '.join(laws)}")
+        return self.select(which)
+
 
 @dataclass(frozen=True)
 class Shard:

@@ -166,13 +166,21 @@ def _check_physics(config: dict) -> None:
         f"scenes.phi_min is {scenes['phi_min']:g}, but must be below scenes.phi_max, "
         f"which is {scenes['phi_max']:g}.",
     )
-    drawn = sum(scenes["number"].values())
+    laws = config["idnn"]["laws"]
+    drawn = sum(scenes["number"][law] for law in laws)
     fewest = 10 * config["idnn"]["folds"]
     _require(
         drawn >= fewest,
-        f"scenes.number is {drawn} in all, but must be at least {fewest}, "
+        f"scenes.number is {drawn} in all of {', '.join(laws)}, but must be at least {fewest}, "
         f"ten scenes for each of the {config['idnn']['folds']} folds of idnn.folds.",
     )
+    share = config["dataset"]["test_share"]
+    for law, number in scenes["number"].items():
+        _require(
+            number == 0 or round(share * number) > 0,
+            f"scenes.number.{law} is {number}, but must be 0 or at least "
+            f"{math.ceil(0.51 / share)}, so that dataset.test_share, {share:g}, leaves a scene.",
+        )
     law = figures["radial_law"]
     _require(
         scenes["number"][law] > 0,

@@ -65,9 +65,63 @@ def trial_layers(name: str) -> str:
     return name.replace("_", "/")
 
 
+def laws(config: dict, model: str) -> list[str]:
+    """Radial laws whose scenes a model is trained on."""
+    return config["idnn"]["laws_of"].get(model, config["idnn"]["laws"])
+
+
+LEARNERS = ("anchored", "idnn")
+"""Models that the learning curve follows."""
+
+ABLATION = (
+    *("dense", "dense_sorted", "pairwise", "idnn", "unit_vectors", "canonical", "residual"),
+    *("anchored", "anchored_pairwise"),
+)
+"""Models of the ablation table: from the dense network to the anchored IDNN, one change a line."""
+
+ON_A_BASELINE = ("residual", "anchored", "anchored_pairwise")
+"""Those of them that stand on a baseline, and are trained like the anchored IDNN."""
+
+
+def learning_curve(config: dict) -> list[str]:
+    """Names of the trials of the learning curve, like anchored-30-30_10-250: model, layers, scenes.
+
+    The IDNN has the layers of the paper.
+    """
+    share = 1 - config["dataset"]["test_share"]
+    return [
+        f"{model}-{layers.replace('/', '_')}-{number}"
+        for model, layers in zip(
+            LEARNERS,
+            (config["idnn"]["layers_of"]["anchored"], config["idnn"]["ablation_layers"]),
+            strict=True,
+        )
+        for number in config["idnn"]["learning_curve"]
+        if number <= share * sum(config["scenes"]["number"][law] for law in laws(config, model))
+    ]
+
+
+def ablation(config: dict) -> list[str]:
+    """Names of the trials of the ablation table; their training scenes are of the paper's law."""
+    layers = config["idnn"]["ablation_layers"]
+    one_block = layers.split("/")[1]
+    return [
+        f"{model}-{one_block if 'dense' in model or 'pairwise' in model else layers}-all".replace(
+            "/", "_"
+        )
+        for model in ABLATION
+    ]
+
+
+def trial_laws(config: dict, model: str, number: str) -> list[str]:
+    """Radial laws that a trial is trained on: the ablation compares on those of all models."""
+    return config["idnn"]["laws"] if number == "all" else laws(config, model)
+
+
 def training(config: dict, model: str) -> dict:
     """Training settings of a model: those of all, and where it differs, its own."""
-    return config["idnn"]["training"] | config["idnn"]["training_of"].get(model, {})
+    own = "anchored" if model in ON_A_BASELINE else model
+    return config["idnn"]["training"] | config["idnn"]["training_of"].get(own, {})
 
 
 def cases(config: dict) -> dict[str, Case]:

@@ -53,20 +53,20 @@ def scores(predictions: Mapping[str, np.ndarray], test: Dataset) -> pd.DataFrame
     return pd.DataFrame(rows)
 
 
-def error_by_distance(
-    predictions: Mapping[str, np.ndarray], test: Dataset, bins: int = 24
+def error_by_gap(
+    predictions: Mapping[str, np.ndarray], target, gap, bins: int = 24
 ) -> pd.DataFrame:
     """Tabulate the error of each model against the gap to the nearest neighbour.
 
-    The scenes, sorted by gap, are cut into `bins` of equal number. Returns the columns model, gap
-    (median of the bin) [d_p], samples, rms_error (of the force vector) and largest_error (of its
-    length) [Re_p c_D].
+    predictions: name -> force (m, 3); target: (m, 3) [Re_p c_D]; gap: (m,) [d_p]. The scenes,
+    sorted by gap, are cut into `bins` of equal number. Returns the columns model, gap (median of
+    the bin) [d_p], samples, rms_error (of the force vector), largest_error (of its length)
+    [Re_p c_D].
     """
-    gap = np.linalg.norm(test.neighbours, axis=2).min(axis=1) - 1.0
     parts = [part for part in np.array_split(np.argsort(gap, kind="stable"), bins) if len(part)]
     rows = []
     for model, predicted in predictions.items():
-        error = np.linalg.norm(predicted - test.force, axis=1)
+        error = np.linalg.norm(predicted - target, axis=1)
         rows += [
             {
                 "model": model,

@@ -1,7 +1,14 @@
 """One function a figure, from the tidy table that is saved beside it to a matplotlib Figure."""
 
 from dustfall.figures.fluctuations import cloud_spectra, ergodicity
-from dustfall.figures.forces import force_pdf, force_scatter, predicted_vs_target, spearman
+from dustfall.figures.forces import (
+    error_by_distance,
+    force_pdf,
+    force_scatter,
+    learning_curve,
+    predicted_vs_target,
+    spearman,
+)
 from dustfall.figures.frozen_cloud import frozen_cloud
 from dustfall.figures.mesh import mesh_study
 from dustfall.figures.settling import (
@@ -17,10 +24,12 @@ from dustfall.figures.voronoi import voronoi_pdf, voronoi_variance
 __all__ = [
     "cloud_spectra",
     "ergodicity",
+    "error_by_distance",
     "force_pdf",
     "force_scatter",
     "frozen_cloud",
     "inverse_beta",
+    "learning_curve",
     "mesh_study",
     "phase_and_spectra",
     "predicted_vs_target",

@@ -1,5 +1,7 @@
 """Figures of the data set and of the force models."""
 
+from itertools import cycle
+
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
@@ -11,6 +13,7 @@ from dustfall.figures.style import (
     CATEGORY_COLOURS,
     COMPONENT_COLOURS,
     DOUBLE,
+    SINGLE,
     letter,
     new_figure,
     phi_colour,
@@ -246,6 +249,68 @@ def predicted_vs_target(frame: pd.DataFrame) -> Figure:
                 ax.set_title(model)
             ax.set_xlabel(f"target {component} force {FORCE_UNIT}")
         axes[row, 0].set_ylabel(f"predicted {FORCE_UNIT}")
+    return figure
+
+
+@styled
+def error_by_distance(frame: pd.DataFrame) -> Figure:
+    """RMS and largest error of each model against the gap to the nearest neighbour.
+
+    `frame`: model, gap, rms_error, largest_error, as `analysis.evaluation.error_by_gap` gives. The
+    line is the RMS error of a bin, the dots its largest. Raises ValueError for a missing column or
+    an empty table.
+    """
+    require(frame, ["model", "gap", "rms_error", "largest_error"], "error_by_distance")
+    figure = new_figure(SINGLE * 1.4, 3.4)
+    ax = figure.subplots()
+    for model, colour in zip(frame["model"].unique(), cycle(CATEGORY_COLOURS), strict=False):
+        rows = frame[frame["model"] == model]
+        ax.plot(rows["gap"], rows["rms_error"], color=colour, label=model)
+        ax.plot(rows["gap"], rows["largest_error"], ".", color=colour, ms=3)
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    ax.set_xlabel("gap to the nearest neighbour [$d_p$]")
+    ax.set_ylabel(f"error of the force {FORCE_UNIT}")
+    ax.legend(title="line: RMS, dots: largest")
+    return figure
+
+
+@styled
+def learning_curve(frame: pd.DataFrame) -> Figure:
+    """1 - R^2 on test scenes against the number of training scenes, a panel a component.
+
+    `frame`: model, component, radial_law, training_scenes, r2, as the trials of the workflow give.
+    Colours tell models, lines radial laws. Raises ValueError for a missing column or an empty
+    table.
+    """
+    columns = ["model", "component", "radial_law", "training_scenes", "r2"]
+    require(frame, columns, "learning_curve")
+    require_components(frame, ["streamwise", "lateral"], "learning_curve")
+    models, laws = frame["model"].unique(), frame["radial_law"].unique()
+    colours = dict(zip(models, CATEGORY_COLOURS, strict=False))
+    lines = dict(zip(laws, ("-", "--", ":"), strict=False))
+    figure = new_figure(DOUBLE, 2.8)
+    axes = figure.subplots(1, 2)
+    for ax, component in zip(axes, ("streamwise", "lateral"), strict=True):
+        for (model, law), rows in frame[frame["component"] == component].groupby(
+            ["model", "radial_law"], sort=False
+        ):
+            rows = rows.sort_values("training_scenes")
+            ax.plot(
+                rows["training_scenes"],
+                1 - rows["r2"],
+                lines[law],
+                color=colours[model],
+                marker=".",
+            )
+        ax.set_xscale("log")
+        ax.set_yscale("log")
+        ax.set_xlabel("training scenes")
+        ax.set_ylabel(f"$1 - R^2$, {component}")
+    handles = [Line2D([], [], color=colours[model], label=model) for model in models]
+    handles += [Line2D([], [], color="k", ls=lines[law], label=f"law {law}") for law in laws]
+    figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))
+    letter(axes)
     return figure
 
 

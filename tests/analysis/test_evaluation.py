@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from dustfall.analysis.evaluation import (
-    error_by_distance,
+    error_by_gap,
     prediction_cost,
     scores,
     symmetry_violations,
@@ -46,7 +46,7 @@ def test_scores_count_each_scene_once_in_its_decade(test_scenes):
 def test_errors_are_sorted_into_gaps(test_scenes):
     gap = np.linalg.norm(test_scenes.neighbours, axis=2).min(axis=1) - 1
     predicted = test_scenes.force + np.outer(1 / (1 + gap), [0.0, 0.6, 0.8])
-    table = error_by_distance({"model": predicted}, test_scenes, bins=10)
+    table = error_by_gap({"model": predicted}, test_scenes.force, gap, bins=10)
     assert table["samples"].tolist() == [12] * 10
     np.testing.assert_allclose(table["rms_error"], 1 / (1 + table["gap"]), rtol=0.5)
     assert (np.diff(table["rms_error"]) < 0).all()

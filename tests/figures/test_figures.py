@@ -8,6 +8,7 @@ import pytest
 from dustfall import figures
 from dustfall.analysis.correlations import predictions_against_target, spearman_by_neighbours
 from dustfall.analysis.distributions import force_distributions, force_samples
+from dustfall.analysis.evaluation import error_by_gap
 from dustfall.analysis.mesh_study import mesh_study_table
 from dustfall.analysis.settling import inverse_beta_table
 from dustfall.figures.style import PHI_RANGE, STYLE, phi_colour, phi_label, save
@@ -57,6 +58,28 @@ def predicted_vs_target():
     target = forces(50)[1]
     models = {"IDNN": 0.98 * target, "dense": 0.9 * target, "anchored": target}
     return predictions_against_target(target, models)
+
+
+def error_by_distance():
+    phi, target = forces(90)
+    return error_by_gap({"IDNN": 0.98 * target, "anchored": 1.001 * target}, target, phi * 1e6, 9)
+
+
+def learning_curve():
+    rows = [
+        {
+            "model": model,
+            "component": component,
+            "radial_law": law,
+            "training_scenes": scenes,
+            "r2": 1 - error / scenes,
+        }
+        for model, error in (("idnn", 10.0), ("anchored", 0.1))
+        for component in ("streamwise", "lateral")
+        for law in ("uniform", "ball")
+        for scenes in (250, 1000, 4000)
+    ]
+    return pd.DataFrame(rows)
 
 
 def inverse_beta():
@@ -213,6 +236,8 @@ TABLES = {
         force_pdf,
         spearman,
         predicted_vs_target,
+        error_by_distance,
+        learning_curve,
         inverse_beta,
         settling_in_time,
         phase_and_spectra,
@@ -245,6 +270,7 @@ XY = {
     "force_scatter": ("volume_fraction", "force"),
     "spearman": ("neighbours", "rho"),
     "predicted_vs_target": ("target", "predicted"),
+    "error_by_distance": ("gap", "rms_error"),
     "inverse_beta": ("volume_fraction", "value"),
     "phase_and_spectra": ("x", "y"),
     "cloud_spectra": ("x", "y"),
@@ -275,6 +301,11 @@ def test_panels_with_two_views_draw_both():
     assert pairs(table, "time", "mean") | pairs(moving, "time", "variance") <= drawn
     table = frozen_cloud().query("panel != 'correlation'")
     assert pairs(table, "x", "y") <= drawn_points(figures.frozen_cloud(frozen_cloud()))
+    table = error_by_distance()
+    assert pairs(table, "gap", "largest_error") <= drawn_points(figures.error_by_distance(table))
+    table = learning_curve()
+    drawn = drawn_points(figures.learning_curve(table))
+    assert pairs(table.assign(left=1 - table["r2"]), "training_scenes", "left") <= drawn
     table = mesh_study()
     assert pairs(table, "nodes", "error") <= drawn_points(figures.mesh_study(table))
 
@@ -358,7 +389,7 @@ def test_empty_tables_and_missing_columns_are_refused(name):
     with pytest.raises(ValueError, match=f"{name} has 0 rows"):
         draw(table.iloc[:0])
     drawn = XY.get(name, ("density" if name == "force_pdf" else "volume_fraction",))[-1]
-    drawn = "dz" if name.startswith("trajectories") else drawn
+    drawn = "dz" if name.startswith("trajectories") else {"learning_curve": "r2"}.get(name, drawn)
     with pytest.raises(ValueError, match=f"{name} lacks the column '{drawn}'"):
         draw(table.drop(columns=drawn))
 

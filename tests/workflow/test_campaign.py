@@ -8,9 +8,11 @@ pytestmark = pytest.mark.slow
 
 SMOKE = ("--configfile", "config/smoke.yaml")
 
-SHARDS = {"scenes": 3, "meshes": 3, "stokes": 3}
+SHARDS = {"scenes": 5, "meshes": 5, "stokes": 5}
 DATA_FIGURES = {"figure_force_scatter": 1, "figure_force_pdf": 1, "figure_spearman": 1}
-MODELS = {"sweep": 4, "winner": 1, "model": 3, "evaluation": 1, "figure_predicted_vs_target": 1}
+SCORES = {"evaluation": 1, "figure_predicted_vs_target": 1, "figure_error_by_distance": 1}
+TRIALS = {"trial": 13, "learning_curve": 1, "ablation": 1, "figure_learning_curve": 1}
+MODELS = {"sweep": 4, "winner": 1, "model": 5, **SCORES, **TRIALS}
 STEADY_TABLE = {
     "steady_state": 1,
     "independence_of_n": 1,
@@ -41,7 +43,7 @@ FROM_DATA = {"dataset": 1, **DATA_FIGURES, **MODELS, **SETTLING}
 def test_every_figure_is_there_with_its_numbers(campaign):
     folder = campaign.folder / "results/figures"
     pictures = sorted(folder.glob("*.png"))
-    assert len(pictures) == 15
+    assert len(pictures) == 17
     for picture in pictures:
         assert picture.read_bytes().startswith(b"\x89PNG")
         assert picture.with_suffix(".pdf").read_bytes().startswith(b"%PDF")
@@ -76,15 +78,24 @@ def test_bits_of_the_data_hang_neither_on_cores_nor_on_shard_size(campaign, tmp_
             {"scenes": 1, "meshes": 1, "stokes": 1} | FROM_DATA,
         ),
         ("meshing={study_sizes: [0.9, 0.7, 0.5]}", {"mesh_study": 1, "figure_mesh_study": 1}),
-        ("stokes={tolerance: 1.0e-3}", {"meshes": 3, "stokes": 3} | FROM_DATA),
+        ("stokes={tolerance: 1.0e-3}", {"meshes": 5, "stokes": 5} | FROM_DATA),
         ("dataset={unconverged_share: 0.02}", FROM_DATA),
         ("dataset={test_share: 0.2}", MODELS | SETTLING),
-        ("idnn={training: {epochs: 70}}", MODELS | SETTLING | {"model": 2}),
         (
-            "idnn={layers_of: {dense: 30-30}}",
-            {"model": 1, "evaluation": 1, "figure_predicted_vs_target": 1},
+            # What stands on a baseline has its own number of epochs.
+            "idnn={training: {epochs: 70}}",
+            MODELS | SETTLING | {"model": 4, "trial": 8},
         ),
-        ("idnn={layers: [10/10, 20-20/20-20, 5/5]}", MODELS | SETTLING | {"sweep": 2, "model": 1}),
+        ("idnn={layers_of: {dense: 30-30}}", {"model": 1, **SCORES}),
+        (
+            "idnn={layers: [10/10, 20-20/20-20, 5/5]}",
+            {"sweep": 2, "winner": 1, "model": 1} | SCORES | SETTLING,
+        ),
+        ("idnn={laws_of: {anchored: [uniform]}}", {"model": 1, **SCORES} | TRIALS | {"trial": 2}),
+        (
+            "idnn={learning_curve: [40, 60, 80]}",
+            {"trial": 2, "learning_curve": 1, "figure_learning_curve": 1},
+        ),
         ("sedimentation={step: 0.05}", ALL_SETTLING),
         (
             "sedimentation={galileo: {multiples: [1, 2, 3]}}",
@@ -111,7 +122,7 @@ def test_an_edited_key_reruns_what_hangs_on_it_and_nothing_else(campaign, settin
     ("file", "expected"),
     [
         ("scenes.py", SHARDS | FROM_DATA),
-        ("stokes/records.py", {"meshes": 3, "stokes": 3} | FROM_DATA),
+        ("stokes/records.py", {"meshes": 5, "stokes": 5} | FROM_DATA),
         ("dataset.py", FROM_DATA),
         ("forces/training.py", MODELS | SETTLING),
         ("sedimentation/dynamics.py", ALL_SETTLING),

@@ -106,7 +106,7 @@ REFUSED = [
     ("scenes.phi_max", 0.7, "scenes.phi_max is 0.7, but must be a number at least 1e-12 and at"),
     ("scenes.phi_max", float("nan"), "scenes.phi_max is nan, but must be a number"),
     ("scenes.phi_min", 2e-3, "scenes.phi_min is 0.002, but must be below scenes.phi_max, which"),
-    ("scenes.number", {"uniform": 20}, "scenes.number is 20 in all, but must be at least 100"),
+    ("scenes.number", {"uniform": 20}, "scenes.number is 20 in all of uniform, but must be at"),
     ("stokes.tolerance", 0, "stokes.tolerance is 0, but must be a number"),
     ("dataset.test_share", 1, "dataset.test_share is 1, but must be a number at least 0.01"),
     ("idnn.folds", 1, "idnn.folds is 1, but must be a whole number at least 2"),
@@ -119,14 +119,21 @@ REFUSED = [
     ("sedimentation.galileo.particles", 3, "galileo.particles is 3, but must be a whole number"),
     ("sedimentation.properties.viscosity", 0, "viscosity is 0, but must be a number above 0."),
     ("sedimentation.properties.particle_density", 1.0, "is 1 kg/m³, but must be above"),
-    ("sedimentation.model", "idn", "sedimentation.model is idn, but must be one of idnn,"),
+    ("sedimentation.model", "idn", "sedimentation.model is idn, but must be one of anchored,"),
     ("sedimentation.statistics_from", 100, "is 100 response times, but must be at most 98"),
     ("sedimentation.duration", 100.01, "duration is 100.01 response times, but must be a multiple"),
     ("sedimentation.save_every", 0.07, "save_every is 0.07 response times, but must be a multiple"),
-    ("figures.radial_law", "ball", "figures.radial_law is ball, but must be a law that"),
+    ("scenes.number.contact", 3, "scenes.number.contact is 3, but must be 0 or at least 6, so"),
+    ("idnn.laws", ["cube"], "idnn.laws[0] is cube, but must be one of uniform, ball, contact."),
     ("figures.fit_frequencies", [2, 1], "fit_frequencies is 2 to 1, but must be the lower to"),
     ("figures.fit_frequencies", [1], "figures.fit_frequencies is [1.0], but must be two numbers"),
 ]
+
+
+def test_figures_need_scenes_of_their_law():
+    settings = {"scenes": {"number": {"ball": 0}}, "figures": {"radial_law": "ball"}}
+    with pytest.raises(ConfigurationError, match=r"figures\.radial_law is ball, but must be a law"):
+        configure(settings)
 
 
 @pytest.mark.parametrize(("key", "value", "sentence"), REFUSED)

@@ -2,10 +2,12 @@
 
 
 wildcard_constraints:
-    law="uniform|ball",
+    law="uniform|ball|contact",
     shard=r"\d+",
     component="streamwise|lateral",
-    layers=r"[\d-]+_[\d-]+",
+    model="[a-z_]+",
+    layers=r"[\d-]+(_[\d-]+)?",
+    number=r"\d+|all",
 
 
 def library(script):
@@ -52,7 +54,7 @@ GALILEO_CASES = [
 ]
 
 # Force models that are trained; the others need no file.
-LEARNED_MODELS = ["idnn", "dense", "anchored"]
+LEARNED_MODELS = ["anchored", "idnn", "pairwise", "dense", "dense_sorted"]
 
 
 def trained(model):
@@ -67,6 +69,8 @@ FIGURES = expand(
         "force_pdf",
         "spearman",
         "predicted_vs_target",
+        "error_by_distance",
+        "learning_curve",
         "inverse_beta",
         "settling_in_time",
         "phase_and_spectra",

@@ -114,9 +114,36 @@ rule figure_predicted_vs_target:
     log:
         "logs/figures/predicted_vs_target.log",
     params:
+        radial_law=config["figures"]["radial_law"],
         samples=config["figures"]["samples"],
     script:
         "../scripts/figure_predicted_vs_target.py"
+
+
+rule figure_error_by_distance:
+    """Error of the force models against the gap to the nearest neighbour."""
+    input:
+        predictions="results/model/predictions.h5",
+        library=library("figure_error_by_distance.py"),
+    output:
+        **figure("error_by_distance", "Force models"),
+    log:
+        "logs/figures/error_by_distance.log",
+    script:
+        "../scripts/figure_error_by_distance.py"
+
+
+rule figure_learning_curve:
+    """What is left unexplained against the number of training scenes."""
+    input:
+        table="results/model/learning_curve.csv",
+        library=library("figure_learning_curve.py"),
+    output:
+        **figure("learning_curve", "Force models"),
+    log:
+        "logs/figures/learning_curve.log",
+    script:
+        "../scripts/figure_learning_curve.py"
 
 
 rule figure_inverse_beta:

@@ -12,6 +12,7 @@ rule sweep:
     params:
         seed=config["seed"],
         test_share=config["dataset"]["test_share"],
+        laws=config["idnn"]["laws"],
         folds=config["idnn"]["folds"],
         layers=lambda wc: plan.trial_layers(wc.layers),
         radial_input=config["idnn"]["radial_input"],
@@ -51,11 +52,66 @@ rule model:
     params:
         seed=config["seed"],
         test_share=config["dataset"]["test_share"],
+        laws=lambda wc: plan.laws(config, wc.model),
         layers=lambda wc: config["idnn"]["layers_of"].get(wc.model),
         radial_input=config["idnn"]["radial_input"],
         training=lambda wc: plan.training(config, wc.model),
     script:
         "../scripts/train.py"
+
+
+rule trial:
+    """Train a model on some scenes and score it on the test scenes: one point of a comparison."""
+    input:
+        data="results/dataset/forces.h5",
+        library=library("trial.py"),
+    output:
+        "results/trials/{model}-{layers}-{number}.csv",
+    log:
+        "logs/trials/{model}-{layers}-{number}.log",
+    benchmark:
+        "benchmarks/trials/{model}-{layers}-{number}.tsv"
+    params:
+        seed=config["seed"],
+        test_share=config["dataset"]["test_share"],
+        laws=lambda wc: plan.trial_laws(config, wc.model, wc.number),
+        layers=lambda wc: plan.trial_layers(wc.layers),
+        radial_input=config["idnn"]["radial_input"],
+        training=lambda wc: plan.training(config, wc.model),
+    script:
+        "../scripts/trial.py"
+
+
+rule learning_curve:
+    """Scores against the number of training scenes."""
+    input:
+        expand("results/trials/{trial}.csv", trial=plan.learning_curve(config)),
+    output:
+        report(
+            "results/model/learning_curve.csv",
+            category="Force models",
+            caption="../report/learning_curve.rst",
+        ),
+    log:
+        "logs/learning_curve.log",
+    script:
+        "../scripts/trials.py"
+
+
+rule ablation:
+    """What each change from the dense network to the anchored IDNN brings."""
+    input:
+        expand("results/trials/{trial}.csv", trial=plan.ablation(config)),
+    output:
+        report(
+            "results/model/ablation.csv",
+            category="Force models",
+            caption="../report/ablation.rst",
+        ),
+    log:
+        "logs/ablation.log",
+    script:
+        "../scripts/trials.py"
 
 
 rule evaluation:
@@ -69,6 +125,11 @@ rule evaluation:
             "results/model/evaluation.csv",
             category="Force models",
             caption="../report/evaluation.rst",
+        ),
+        symmetries=report(
+            "results/model/symmetries.csv",
+            category="Force models",
+            caption="../report/symmetries.rst",
         ),
         predictions="results/model/predictions.h5",
     log:

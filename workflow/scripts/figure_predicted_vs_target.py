@@ -13,7 +13,8 @@ joblog.start(snakemake.log[0])
 
 names = {"idnn": "IDNN", "dense": "dense ANN", "anchored": "anchored IDNN"}
 with h5py.File(snakemake.input.predictions) as file:
-    target = file["target"][()]
-    predictions = {title: file[name][()] for name, title in names.items()}
+    own = file["radial_law"][()].astype(str) == snakemake.params.radial_law
+    target = file["target"][()][own]
+    predictions = {title: file[name][()][own] for name, title in names.items()}
 table = predictions_against_target(target, predictions, snakemake.params.samples)
 save(predicted_vs_target(table), table, Path(snakemake.output.png).with_suffix(""))

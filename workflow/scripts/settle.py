@@ -5,8 +5,8 @@ import shutil
 from pathlib import Path
 
 import joblog
+from dustfall.forces.formulas import FORMULAS
 from dustfall.forces.models import load_model
-from dustfall.forces.rotne_prager import IsolatedStokes, RotnePrager
 from dustfall.sedimentation.properties import Properties
 from dustfall.sedimentation.settle import settle
 from dustfall.sedimentation.start import read_start
@@ -14,12 +14,8 @@ from dustfall.sedimentation.start import read_start
 progress = joblog.start(snakemake.log[0])
 params, case = snakemake.params, snakemake.wildcards.case
 
-if params.model == "isolated":
-    model = IsolatedStokes()
-elif params.model == "rotne_prager":
-    model = RotnePrager()
-else:
-    model = load_model(snakemake.input.model)
+learned = snakemake.input.model
+model = load_model(learned) if learned else FORMULAS[params.model]()
 properties = Properties(**params.properties)
 
 positions = velocities = None

@@ -12,6 +12,7 @@ progress = joblog.start(snakemake.log[0])
 params = snakemake.params
 
 training, _ = split(read(snakemake.input.data), params.test_share, params.seed)
+training = training.of_laws(params.laws)
 result = cross_validate(
     training.neighbours,
     training.force,

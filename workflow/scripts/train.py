@@ -12,6 +12,7 @@ params = snakemake.params
 kind = snakemake.wildcards.model
 
 training, _ = split(read(snakemake.input.data), params.test_share, params.seed)
+training = training.of_laws(params.laws)
 layers = params.layers or json.loads(Path(snakemake.input.winner).read_text())["layers"]
 model = train_model(
     kind,
