@@ -26,6 +26,7 @@ def cross_validate(
     seed: int = 1,
     kind: str = "idnn",
     radial_input: str = "logarithm",
+    device: str = "cpu",
     progress=None,
 ) -> dict:
     """Train a layer configuration once a fold, each time validated on the fold left out.
@@ -67,6 +68,7 @@ def cross_validate(
             settings,
             [seed, fold + 1],
             report,
+            device,
         )
         scores = score(network, scenes, force, component, validation)
         results.append({"fold": fold, **scores, "epochs": history.best_epoch})

@@ -152,6 +152,7 @@ def train_model(
     settings: TrainingSettings | None = None,
     seed: int = 1,
     radial_input: str = "logarithm",
+    device: str = "cpu",
     progress=None,
 ) -> LearnedModel:
     """Train both components of a force model.
@@ -160,8 +161,9 @@ def train_model(
     Re_p c_D; `layers` hidden widths as in "40-40/30-30-30" (dense and pairwise: one block);
     `settings` by default those of `SETTINGS`; `radial_input` what the spherical coordinates give
     for the distance, "distance" or "logarithm" (unit vectors come with 1/r and log r). One sample
-    in ten, drawn from the seed, is kept for validation. The same arguments give the same bits on
-    one machine. `progress(done, total)` counts epochs.
+    in ten, drawn from the seed, is kept for validation. `device` is PyTorch's, "cpu" or "cuda": on
+    the CPU the same arguments give the same bits on one machine. `progress(done, total)` counts
+    epochs.
 
     Raises ValueError for arguments out of range and FloatingPointError when training diverges.
     """
@@ -180,7 +182,17 @@ def train_model(
                 progress(done + epoch, len(COMPONENTS) * settings.epochs)
 
         networks[component], history[component] = train_component(
-            kind, scenes, force, component, layers, training, validation, settings, [seed], report
+            kind,
+            scenes,
+            force,
+            component,
+            layers,
+            training,
+            validation,
+            settings,
+            [seed],
+            report,
+            device,
         )
         scores[component] = score(networks[component], scenes, force, component, validation)
     if progress:
@@ -224,11 +236,14 @@ def train_component(
     settings: TrainingSettings,
     trial: list[int],
     report=None,
+    device: str = "cpu",
 ) -> tuple[Network, History]:
     """Train one component's network on the rows `training`; return it with its history.
 
     Initial weights and batches hang on `trial` (integers) and the component alone.
     """
+    if device != "cpu" and not torch.cuda.is_available():
+        raise ValueError(f"device is {device!r}, but PyTorch finds no GPU here; use 'cpu'")
     entropy = [*trial, _TRIAL, list(COMPONENTS).index(component)]
     (state,) = np.random.SeedSequence(entropy).generate_state(1, np.uint64)
     generator = torch.Generator().manual_seed(int(state))
@@ -239,11 +254,11 @@ def train_component(
     mean, scale = rows.mean(axis=0), rows.std(axis=0)
     scale[scale == 0.0] = 1.0
     tensors = [
-        torch.from_numpy(np.ascontiguousarray(array, dtype=np.float32))
+        torch.from_numpy(np.ascontiguousarray(array, dtype=np.float32)).to(device)
         for array in ((scenes.inputs - mean) / scale, scenes.envelope, target / unit)
     ]
     with one_thread():
-        network = build(kind, layers, component, generator)
+        network = build(kind, layers, component, generator).to(device)
         epochs, errors = fit(
             network,
             tensors,
@@ -255,7 +270,7 @@ def train_component(
         )
     blocks = [
         [
-            tuple(p.detach().numpy().copy() for p in layer.parameters())
+            tuple(p.detach().cpu().numpy().copy() for p in layer.parameters())
             for layer in block
             if isinstance(layer, nn.Linear)
         ]

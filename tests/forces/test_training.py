@@ -135,6 +135,23 @@ def test_samples_that_do_not_fit_are_refused(samples):
         train_model("idnn", neighbours, force, "8/8", radial_input="square")
 
 
+@pytest.mark.skipif(torch.cuda.is_available(), reason="needs a machine without a GPU")
+def test_a_gpu_that_is_not_there_is_named(samples):
+    with pytest.raises(ValueError, match="no GPU"):
+        train_model("dense", *samples, "8", TrainingSettings(epochs=1), device="cuda")
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
+def test_a_gpu_trains_as_well_as_the_processor(samples):
+    settings = TrainingSettings(batch_size=128, epochs=10)
+    errors = [
+        train_model("idnn", *samples, "8/8", settings, device=device).header["training"]
+        for device in ("cpu", "cuda")
+    ]
+    one, other = (error["validation"]["streamwise"]["mse"] for error in errors)
+    assert other == pytest.approx(one, rel=0.2)
+
+
 def test_diverging_training_says_so(samples):
     settings = TrainingSettings(epochs=20, learning_rate=1e30, batch_size=64)
     with pytest.raises(FloatingPointError, match="diverged"):

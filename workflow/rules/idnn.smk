@@ -16,6 +16,7 @@ rule sweep:
         folds=config["idnn"]["folds"],
         layers=lambda wc: plan.trial_layers(wc.layers),
         radial_input=config["idnn"]["radial_input"],
+        device=config["idnn"]["device"],
         training=config["idnn"]["training"],
     script:
         "../scripts/sweep.py"
@@ -55,6 +56,7 @@ rule model:
         laws=lambda wc: plan.laws(config, wc.model),
         layers=lambda wc: config["idnn"]["layers_of"].get(wc.model),
         radial_input=config["idnn"]["radial_input"],
+        device=config["idnn"]["device"],
         training=lambda wc: plan.training(config, wc.model),
     script:
         "../scripts/train.py"
@@ -77,6 +79,7 @@ rule trial:
         laws=lambda wc: plan.trial_laws(config, wc.model, wc.number),
         layers=lambda wc: plan.trial_layers(wc.layers),
         radial_input=config["idnn"]["radial_input"],
+        device=config["idnn"]["device"],
         training=lambda wc: plan.training(config, wc.model),
     script:
         "../scripts/trial.py"

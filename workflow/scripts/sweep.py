@@ -22,6 +22,7 @@ result = cross_validate(
     TrainingSettings(**params.training),
     params.seed,
     radial_input=params.radial_input,
+    device=params.device,
     progress=progress(f"{snakemake.wildcards.component} {params.layers}", "epochs"),
 )
 with atomic(snakemake.output[0]) as path:

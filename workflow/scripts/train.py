@@ -22,6 +22,7 @@ model = train_model(
     TrainingSettings(**params.training),
     params.seed,
     radial_input=params.radial_input,
+    device=params.device,
     progress=progress(f"{kind} {layers}", "epochs"),
 )
 print(json.dumps(model.header, indent=2))

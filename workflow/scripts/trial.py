@@ -28,6 +28,7 @@ model = train_model(
     TrainingSettings(**params.training),
     params.seed,
     radial_input=params.radial_input,
+    device=params.device,
     progress=progress(f"{wildcards.model} {params.layers}, {len(training)} scenes", "epochs"),
 )
 table = scores({model.name: model.predict(test.neighbours)}, test)
