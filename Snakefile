@@ -49,6 +49,7 @@ rule all:
     input:
         "results/config.yaml",
         "results/dataset/summary.csv",
+        "results/dataset/summary.json",
         "results/model/evaluation.csv",
         "results/analysis/independence_of_n.csv",
         "results/analysis/neighbour_changes.csv",
@@ -69,10 +70,11 @@ rule exports:
 
 
 rule benchmarks:
-    """Run time of the solver against its error; no part of `all`, as timings differ each time."""
+    """Error against run time of solver and models; no part of `all`, as timings differ."""
     input:
         "results/benchmarks/solver.csv",
         "results/benchmarks/stress.csv",
+        "results/figures/accuracy_vs_cost.png",
 
 
 rule studies:

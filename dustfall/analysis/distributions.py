@@ -97,8 +97,9 @@ def force_summary(volume_fraction, force) -> pd.DataFrame:
     component, phi_low, phi_high, samples, value, paper (NaN where the paper has none). Quantities:
     shares of samples at least 15 % and 34 % below Stokes drag, the reductions that 30 % and 10 %
     of the samples exceed, mean, variance, and for the lateral components (each, and both as
-    "lateral") the scale of the fitted Laplace law, its Kolmogorov-Smirnov distance, that of the
-    fitted normal law beside it, and the excess kurtosis (Laplace: 3, normal: 0).
+    "lateral") the scale of the fitted Laplace law, its Kolmogorov-Smirnov distance, the distance
+    that one sample in twenty of a law would exceed (1.36/sqrt(m)), that of the fitted normal law
+    beside it, and the excess kurtosis (Laplace: 3, normal: 0).
 
     Raises ValueError for bad arrays.
     """
@@ -126,6 +127,7 @@ def force_summary(volume_fraction, force) -> pd.DataFrame:
                 figures |= {
                     "laplace_scale": law["scale"],
                     "laplace_ks": law["ks"],
+                    "ks_of_one_in_twenty": 1.36 / np.sqrt(len(values)),
                     "normal_ks": normal,
                     "excess_kurtosis": stats.kurtosis(values),
                 }

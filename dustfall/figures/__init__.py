@@ -2,6 +2,7 @@
 
 from dustfall.figures.fluctuations import cloud_spectra, ergodicity
 from dustfall.figures.forces import (
+    accuracy_vs_cost,
     error_by_distance,
     force_pdf,
     force_scatter,
@@ -22,6 +23,7 @@ from dustfall.figures.style import save
 from dustfall.figures.voronoi import voronoi_pdf, voronoi_variance
 
 __all__ = [
+    "accuracy_vs_cost",
     "cloud_spectra",
     "ergodicity",
     "error_by_distance",

@@ -314,6 +314,39 @@ def learning_curve(frame: pd.DataFrame) -> Figure:
     return figure
 
 
+@styled
+def accuracy_vs_cost(frame: pd.DataFrame) -> Figure:
+    """1 - R^2 of each model against the processor time of a prediction, a panel a component.
+
+    `frame`: model, component, r2, microseconds. Raises ValueError for a missing column or an empty
+    table.
+    """
+    require(frame, ["model", "component", "r2", "microseconds"], "accuracy_vs_cost")
+    require_components(frame, ["streamwise", "lateral"], "accuracy_vs_cost")
+    figure = new_figure(DOUBLE, 2.8)
+    axes = figure.subplots(1, 2)
+    for ax, component in zip(axes, ("streamwise", "lateral"), strict=True):
+        rows = frame[frame["component"] == component]
+        unexplained = 1 - rows["r2"]
+        ax.plot(rows["microseconds"], unexplained, "o", color=COMPONENT_COLOURS[component])
+        for place in zip(rows["microseconds"], unexplained, rows["model"], strict=True):
+            ax.annotate(
+                place[2].replace("_", " "),
+                place[:2],
+                (0, 5),
+                textcoords="offset points",
+                ha="center",
+                fontsize=7,
+            )
+        ax.set_xscale("log")
+        ax.set_yscale("log")
+        ax.margins(0.15)
+        ax.set_xlabel(r"processor time [$\mu$s a particle]")
+        ax.set_ylabel(f"$1 - R^2$, {component}")
+    letter(axes)
+    return figure
+
+
 def determination(r2: float) -> str:
     """R^2 with as many digits as tell it from one."""
     digits = 3 if r2 >= 1 or r2 < 0.99 else int(np.ceil(-np.log10(1 - r2))) + 1

@@ -82,6 +82,10 @@ def learning_curve():
     return pd.DataFrame(rows)
 
 
+def accuracy_vs_cost():
+    return learning_curve().assign(microseconds=lambda table: table["training_scenes"] / 1e3)
+
+
 def inverse_beta():
     steady = pd.DataFrame(
         [
@@ -238,6 +242,7 @@ TABLES = {
         predicted_vs_target,
         error_by_distance,
         learning_curve,
+        accuracy_vs_cost,
         inverse_beta,
         settling_in_time,
         phase_and_spectra,
@@ -306,6 +311,9 @@ def test_panels_with_two_views_draw_both():
     table = learning_curve()
     drawn = drawn_points(figures.learning_curve(table))
     assert pairs(table.assign(left=1 - table["r2"]), "training_scenes", "left") <= drawn
+    table = accuracy_vs_cost()
+    drawn = drawn_points(figures.accuracy_vs_cost(table))
+    assert pairs(table.assign(left=1 - table["r2"]), "microseconds", "left") <= drawn
     table = mesh_study()
     assert pairs(table, "nodes", "error") <= drawn_points(figures.mesh_study(table))
 
@@ -389,7 +397,8 @@ def test_empty_tables_and_missing_columns_are_refused(name):
     with pytest.raises(ValueError, match=f"{name} has 0 rows"):
         draw(table.iloc[:0])
     drawn = XY.get(name, ("density" if name == "force_pdf" else "volume_fraction",))[-1]
-    drawn = "dz" if name.startswith("trajectories") else {"learning_curve": "r2"}.get(name, drawn)
+    others = {"learning_curve": "r2", "accuracy_vs_cost": "r2"}
+    drawn = "dz" if name.startswith("trajectories") else others.get(name, drawn)
     with pytest.raises(ValueError, match=f"{name} lacks the column '{drawn}'"):
         draw(table.drop(columns=drawn))
 

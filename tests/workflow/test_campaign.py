@@ -37,7 +37,7 @@ SETTLING = {
 }
 # Three more cases have a model that no data were needed for.
 ALL_SETTLING = SETTLING | {"sedimentation": 10}
-FROM_DATA = {"dataset": 1, **DATA_FIGURES, **MODELS, **SETTLING}
+FROM_DATA = {"dataset": 1, "data_summary": 1, **DATA_FIGURES, **MODELS, **SETTLING}
 
 
 def test_every_figure_is_there_with_its_numbers(campaign):

@@ -37,6 +37,7 @@ def test_the_paper_takes_the_expected_jobs_and_fewer_than_a_thousand(project):
         "meshes": shards,
         "stokes": shards,
         "dataset": 1,
+        "data_summary": 1,
         # 12 configurations of layers for each of 2 components
         "sweep": 24,
         "winner": 1,

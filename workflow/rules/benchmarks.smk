@@ -1,3 +1,20 @@
+rule prediction_benchmark:
+    """Score of each force model on the paper's law against the cost of a prediction."""
+    input:
+        data="results/dataset/forces.h5",
+        scores="results/model/evaluation.csv",
+        models=expand("results/model/{model}.safetensors", model=LEARNED_MODELS),
+        library=library("prediction_benchmark.py"),
+    output:
+        **figure("accuracy_vs_cost", "Force models"),
+    log:
+        "logs/benchmarks/prediction.log",
+    params:
+        radial_law=config["figures"]["radial_law"],
+    script:
+        "../scripts/prediction_benchmark.py"
+
+
 rule solver_benchmark:
     """Run time of the Stokes solver, its rungs, references and peers against the error."""
     input:
