@@ -135,7 +135,7 @@ def _baseline(name, neighbours):
     return force
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _unit_vectors(neighbours, largest):
     count = neighbours.shape[0]
     inputs = np.empty((count, NEIGHBOURS, 5))

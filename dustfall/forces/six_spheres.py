@@ -28,7 +28,7 @@ _TORQUE = 4 / 3 * 0.25
 TERMS = 7
 """Coefficients of the polynomials of the pair correction, highest power first."""
 
-_compiled = njit(cache=True, fastmath={"contract"}, error_model="numpy")
+_compiled = njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
 
 
 @_compiled

@@ -1,4 +1,4 @@
-"""Quadrature on triangles, on pairs of triangles that touch, and on the sphere.
+"""Quadrature on triangles and on pairs of triangles that touch.
 
 Points on a triangle are barycentric coordinates (l0, l1, l2); weights add up to 1, so an integral
 over a flat triangle is its area times the weighted sum.
@@ -8,11 +8,7 @@ from functools import cache
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss
-from scipy.integrate import lebedev_rule
 from scipy.special import roots_jacobi
-
-LEBEDEV_DEGREES = (3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31, 35, 41, 47, 53, 59)
-"""Degrees up to which a rule with positive weights exists (Lebedev and Laikov 1999)."""
 
 
 @cache
@@ -75,13 +71,3 @@ def touching_pair_rule(shared: int, n: int) -> tuple[np.ndarray, np.ndarray, np.
     y = np.concatenate([barycentric(region[1]) for region in regions])
     weights = np.concatenate([w4 * region[2] for region in regions])
     return x, y, weights
-
-
-@cache
-def sphere_rule(degree: int) -> tuple[np.ndarray, np.ndarray]:
-    """Lebedev rule on the unit sphere of at least this degree: (q, 3) points, weights sum 4 pi."""
-    allowed = [d for d in LEBEDEV_DEGREES if d >= degree]
-    if not allowed:
-        raise ValueError(f"sphere rule of degree {degree}: at most {LEBEDEV_DEGREES[-1]}")
-    points, weights = lebedev_rule(allowed[0])
-    return np.ascontiguousarray(points.T), weights

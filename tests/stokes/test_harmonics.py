@@ -21,6 +21,14 @@ def test_harmonics_are_orthonormal():
     np.testing.assert_allclose(values.T @ (WEIGHTS[:, None] * values), np.eye(225), atol=1e-12)
 
 
+def test_harmonics_have_the_textbook_forms():
+    x, y, z = direction = np.array([0.48, -0.6, 0.64])
+    values = real_harmonics(2, direction[None])[0]
+    c = np.sqrt(3.0 / (4.0 * np.pi))
+    np.testing.assert_allclose(values[:4], [0.5 / np.sqrt(np.pi), c * y, c * z, c * x], rtol=1e-13)
+    assert values[4] == pytest.approx(np.sqrt(15.0 / (4.0 * np.pi)) * x * y)
+
+
 @pytest.mark.parametrize("degree", [0, 1, 4, 15, 40])
 def test_swapping_axes_twice_changes_nothing(degree):
     swap = axes_swapped(degree)

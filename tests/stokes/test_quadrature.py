@@ -5,8 +5,7 @@ from math import factorial
 import numpy as np
 import pytest
 
-from dustfall.stokes.harmonics import real_harmonics
-from dustfall.stokes.quadrature import sphere_rule, touching_pair_rule, triangle_rule
+from dustfall.stokes.quadrature import touching_pair_rule, triangle_rule
 
 
 def mean_of_monomial(i, j, k):
@@ -65,24 +64,6 @@ def test_mean_inverse_distance_within_a_square_is_the_known_constant():
     assert 0.5 * (same + across) == pytest.approx(known, rel=1e-8)
 
 
-@pytest.mark.parametrize("degree", [3, 8, 20])
-def test_harmonics_are_orthonormal_under_the_sphere_rule(degree):
-    points, weights = sphere_rule(2 * (degree // 2))
-    values = real_harmonics(degree // 2, points)
-    gram = values.T @ (weights[:, None] * values)
-    np.testing.assert_allclose(gram, np.eye(len(gram)), atol=1e-12)
-
-
-def test_harmonics_have_the_textbook_forms():
-    x, y, z = direction = np.array([0.48, -0.6, 0.64])
-    values = real_harmonics(2, direction[None])[0]
-    c = np.sqrt(3.0 / (4.0 * np.pi))
-    np.testing.assert_allclose(values[:4], [0.5 / np.sqrt(np.pi), c * y, c * z, c * x], rtol=1e-13)
-    assert values[4] == pytest.approx(np.sqrt(15.0 / (4.0 * np.pi)) * x * y)
-
-
 def test_rules_that_do_not_exist_are_refused():
-    with pytest.raises(ValueError, match="at most 59"):
-        sphere_rule(60)
     with pytest.raises(ValueError, match="share 1, 2 or 3"):
         touching_pair_rule(0, 3)

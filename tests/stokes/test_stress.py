@@ -34,8 +34,8 @@ def test_pairs_far_apart_are_exact_to_the_tolerance():
 
 def test_place_turn_and_nearly_equal_distances_change_nothing():
     table = stress.invariances(BODY, (1e-4,), gap=0.1)
-    assert (table["error"] <= table["tolerance"]).all()
-    assert (table[table["case"] != "distances alike"]["error"] < 1e-9).all()
+    # Rounding may choose other degrees; forces change by a hundredth of the tolerance at most.
+    assert (table["error"] <= 0.01 * table["tolerance"]).all()
 
 
 def test_the_answer_does_not_know_how_the_mesh_is_turned():

@@ -91,7 +91,10 @@ def test_bits_of_the_data_hang_neither_on_cores_nor_on_shard_size(campaign, tmp_
             "idnn={layers: [10/10, 20-20/20-20, 5/5]}",
             {"sweep": 2, "winner": 1, "model": 1} | SCORES | SETTLING,
         ),
-        ("idnn={laws_of: {anchored: [uniform]}}", {"model": 1, **SCORES} | TRIALS | {"trial": 2}),
+        (
+            "idnn={laws_of: {anchored: [uniform]}}",
+            {"model": 1, "trial": 2, "learning_curve": 1, "figure_learning_curve": 1, **SCORES},
+        ),
         (
             "idnn={learning_curve: [40, 60, 80]}",
             {"trial": 2, "learning_curve": 1, "figure_learning_curve": 1},
