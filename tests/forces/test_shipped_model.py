@@ -47,4 +47,5 @@ def test_shipped_model_says_where_it_comes_from():
     assert header["kind"] == "anchored"
     assert len(header["training"]["data_sha256"]) == 64
     assert header["training"]["samples"] >= 25_000
+    assert header["training"]["command"] == "snakemake -- results/model/anchored.safetensors"
     assert header["units"] == {"length": "d_p", "force": "Re_p c_D"}

@@ -25,5 +25,6 @@ model = train_model(
     device=params.device,
     progress=progress(f"{kind} {layers}", "epochs"),
 )
+model.header["training"]["command"] = f"snakemake -- {snakemake.output[0]}"
 print(json.dumps(model.header, indent=2))
 model.save(snakemake.output[0])
