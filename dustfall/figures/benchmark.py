@@ -49,7 +49,7 @@ def solver_benchmark(frame: pd.DataFrame) -> Figure:
         panel.plot(best["milliseconds"], best["error_95"], color=REFERENCE, ls=":", zorder=0)
         panel.set_xscale("log")
         panel.set_yscale("log")
-        panel.text(0.96, 0.95, name, transform=panel.transAxes, ha="right", va="top")
+        panel.set_title(name, loc="right")
     for panel in panels[len(sets) :]:
         panel.set_visible(False)
     figure.supxlabel("time a scene [ms]", fontsize=9)

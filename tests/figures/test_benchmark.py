@@ -24,7 +24,7 @@ def test_each_set_has_a_panel_with_every_method():
         }
     )
     panels = [ax for ax in solver_benchmark(frame).axes if ax.get_visible()]
-    assert [panel.texts[0].get_text() for panel in panels] == ["one", "two"]
+    assert [panel.get_title("right") for panel in panels] == ["one", "two"]
     for panel in panels:
         labels = [line.get_label() for line in panel.lines]
         assert {"a", "b"} <= set(labels)

@@ -20,7 +20,7 @@ low, high = np.log10([params.phi_min, params.phi_max])
 edges = 10.0 ** np.append(np.arange(low, high - 1e-9), high)
 sets = {}
 for begin, end in pairwise(edges):
-    name = f"phi from {begin:.0e}"
+    name = f"phi from {np.format_float_scientific(begin, 0, trim='-', exp_digits=1)}"
     neighbours, _ = random_scenes(params.seed, "uniform", range(params.scenes), (begin, end))
     sets[name] = np.concatenate([np.zeros((params.scenes, 1, 3)), neighbours], axis=1)
 neighbours, _ = random_scenes(params.seed, "contact", range(params.scenes), tuple(edges[-2:]))
