@@ -227,9 +227,10 @@ def settle(
             remove_leftovers(file)
         write_trajectory(trajectory, frames, side, attributes)
         write_series(series, rows, tracked, attributes)
+        # States first: a state whose records are gone could not be resumed.
+        checkpoints.clear(folder)
         frames.remove()
         rows.remove()
-        checkpoints.clear(folder)
     return {
         "steps": done - first,
         "seconds": seconds,

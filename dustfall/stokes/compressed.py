@@ -138,9 +138,10 @@ def solve_scene(centres, flow, orders, response, tables, tolerance, most):
         _respond(degrees[i], response, uniform[own], right[own])
     solution, iterations, residual = np.zeros_like(right), 0, 0.0
     if n > 1:
-        basis = np.zeros((most + 1, *right.shape))
-        hessenberg = np.zeros((most + 1, most))
-        cosines, sines, target = np.zeros(most), np.zeros(most), np.zeros(most + 1)
+        # Not zeroed: most iterations never come, and clearing their memory costs more than a scene.
+        basis = np.empty((most + 1, *right.shape))
+        hessenberg = np.empty((most + 1, most))
+        cosines, sines, target = np.empty(most), np.empty(most), np.empty(most + 1)
         norm = np.sqrt(np.sum(right**2))
         basis[0] = right / norm
         target[0] = norm

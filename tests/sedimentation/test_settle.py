@@ -352,6 +352,23 @@ def test_run_that_crashes_amid_a_checkpoint_goes_on_to_the_same_bits(
     assert_same_files(tmp_path, undisturbed)
 
 
+@pytest.mark.parametrize("last", ["state.npz", "state.previous.npz", "frames.bin", "series.bin"])
+def test_run_that_crashes_amid_its_clearing_up_goes_on_to_the_same_bits(
+    tmp_path, undisturbed, monkeypatch, last
+):
+    def crash(path, *arguments, unlink=Path.unlink, **settings):
+        unlink(path, *arguments, **settings)
+        if path.name == last:
+            raise Interruption
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "unlink", crash)
+        with pytest.raises(Interruption):
+            run(tmp_path, checkpoint=tmp_path / "checkpoint", checkpoint_interval=0.0)
+    run(tmp_path, checkpoint=tmp_path / "checkpoint")
+    assert_same_files(tmp_path, undisturbed)
+
+
 def interrupt_at(step):
     def interrupt(done, total):
         if done == step:
