@@ -114,6 +114,12 @@ def single_layer_spectrum(degree: int) -> np.ndarray:
     return spectrum
 
 
+def exact_response(degree: int) -> np.ndarray:
+    """How a sphere answers exactly, (degree + 1, 3): the inverse of its single layer's spectrum."""
+    spectrum = single_layer_spectrum(degree)
+    return np.divide(1.0, spectrum, out=np.zeros_like(spectrum), where=spectrum > 0.0)
+
+
 def response_matrix(response) -> csr_array:
     """Traction moments for incoming harmonics, (3k, 3k): response[n, J - n + 1] on each subspace.
 

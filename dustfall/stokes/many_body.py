@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from dustfall.stokes.compressed import solve_scene
-from dustfall.stokes.harmonics import response_matrix, single_layer_spectrum
+from dustfall.stokes.harmonics import exact_response, response_matrix, single_layer_spectrum
 from dustfall.stokes.mesh import sphere_mesh
 from dustfall.stokes.one_body import OneBody
 from dustfall.stokes.spheres import (
@@ -155,9 +155,15 @@ class Response:
 
         A degree n matters as much as it would be missed.
         """
-        xi = np.arccosh(1.0 + min(gap, 1e100))
-        missed = truncation_error(np.arange(len(self.deviation) - 1.0), xi, xi)
-        return float(self.deviation @ np.append(1.0, missed)[: len(self.deviation)])
+        return float(self.deviation @ _felt(len(self.deviation), np.arccosh(1.0 + min(gap, 1e100))))
+
+
+def _felt(degrees: int, xi: float) -> np.ndarray:
+    """What leaving each degree out does to the force of a pair, (degrees,); degree 0 is all of it.
+
+    cosh(xi) = distance / d_p, zero for spheres that touch.
+    """
+    return np.append(1.0, truncation_error(np.arange(degrees - 1.0), xi, xi))[:degrees]
 
 
 def one_body_response(body: OneBody, tolerance: float) -> Response:
@@ -168,21 +174,24 @@ def one_body_response(body: OneBody, tolerance: float) -> Response:
     which it would do a hundredth of the tolerance, the known spectrum takes over.
     Raises ValueError for a template that does not resolve the lone sphere to 1e-3.
     """
-    spectrum = single_layer_spectrum(MOST_DEGREE)
-    response = np.divide(1.0, spectrum, out=np.zeros_like(spectrum), where=spectrum > 0.0)
+    response = exact_response(MOST_DEGREE)
     count = len(body.response)
-    wrong = np.abs(body.response * spectrum[:count] - (spectrum[:count] > 0.0)).max(axis=1)
+    spectrum = single_layer_spectrum(count - 1)
+    wrong = np.abs(body.response * spectrum - (spectrum > 0.0)).max(axis=1)
     if wrong[0] > 1e-3:
         raise ValueError(
             f"the template of {len(body.mesh.triangles)} elements is {wrong[0]:.1e} off for a lone "
             "sphere: its edges are too long"
         )
-    felt = np.append(1.0, truncation_error(np.arange(count - 1.0), 0.0, 0.0))
-    resolved = int(np.argmin(np.append(wrong * felt <= 0.01 * tolerance, False)))
+    resolved = int(np.argmin(np.append(wrong * _felt(count, 0.0) <= 0.01 * tolerance, False)))
     response[:resolved] = body.response[:resolved]
+    return Response(*response_rows(response), wrong[:resolved])
+
+
+def response_rows(response) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`response_matrix` as the kernels take it: data, indices and starts of its sparse rows."""
     matrix = response_matrix(response)
-    starts, indices = matrix.indptr.astype(np.int64), matrix.indices.astype(np.int64)
-    return Response(matrix.data, indices, starts, wrong[:resolved])
+    return matrix.data, matrix.indices.astype(np.int64), matrix.indptr.astype(np.int64)
 
 
 def solve(

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from dustfall import STOKES_DRAG
 from dustfall.stokes.compressed import apply_system, couple_scene, solve_scene
 from dustfall.stokes.exact import forces_on_two_spheres
-from dustfall.stokes.harmonics import response_matrix, single_layer_spectrum
-from dustfall.stokes.many_body import one_body_response, plan_scene, solve
+from dustfall.stokes.harmonics import exact_response
+from dustfall.stokes.many_body import one_body_response, plan_scene, response_rows, solve
 from dustfall.stokes.mesh import SphereMesh, sphere_mesh
 from dustfall.stokes.one_body import OneBody
 from dustfall.stokes.single_layer import nodal_integrals, self_interaction
@@ -136,18 +136,11 @@ def fine_forces(centres, flow, degree: int) -> np.ndarray:
     """Forces (n, 3) [Re_p c_D] with all degrees up to `degree` on every sphere, no tolerance."""
     orders = np.full((len(centres), len(centres)), degree)
     np.fill_diagonal(orders, 0)
+    response, tables = response_rows(exact_response(degree)), translation_tables(degree)
     force, _, _ = solve_scene(
-        np.asarray(centres) / RADIUS, np.asarray(flow), orders, _exact_response(degree),
-        translation_tables(degree), 1e-11, 600,
-    )  # fmt: skip
+        np.asarray(centres) / RADIUS, np.asarray(flow), orders, response, tables, 1e-11, 600
+    )
     return FORCE_UNIT * RADIUS * force
-
-
-def _exact_response(degree):
-    spectrum = single_layer_spectrum(degree)
-    answer = np.divide(1.0, spectrum, out=np.zeros_like(spectrum), where=spectrum > 0.0)
-    matrix = response_matrix(answer)
-    return matrix.data, matrix.indices.astype(np.int64), matrix.indptr.astype(np.int64)
 
 
 def _solved(centres, exact, body, tolerance) -> dict:
@@ -176,7 +169,7 @@ def _change(case, value, tolerance, difference) -> dict:
 
 def _pair_system(distance, order) -> np.ndarray:
     """Matrix 1 + T K of two spheres at a distance [d_p], column by column."""
-    tables, response = translation_tables(), _exact_response(order)
+    tables, response = translation_tables(), response_rows(exact_response(order))
     orders = np.array([[0, order], [order, 0]])
     scene = couple_scene(distance / RADIUS * CLUSTERS["pair"].astype(float), orders, tables)
     columns = []

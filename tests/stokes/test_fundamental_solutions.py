@@ -9,25 +9,13 @@ from dustfall.stokes import fundamental_solutions
 from dustfall.stokes.exact import forces_on_two_spheres
 from dustfall.stokes.fundamental_solutions import reference_forces, solve_with
 from dustfall.stokes.many_body import forces_on_fixed_spheres
+from tests.stokes.clusters import chain, six, triangle
 
 OBLIQUE = np.array([0.3, 0.9, -0.5])
 
 
 def pair(s):
     return np.array([[0.2, 0.1, -0.4], [0.2 + 0.3 * s, 0.1, -0.4 + 0.4 * s]])
-
-
-def triangle(s):
-    return s / 2.0 * np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, np.sqrt(0.75), 0.0]])
-
-
-def chain(s):
-    return s / 2.0 * np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-
-
-def six(s):
-    arms = [[0, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]]
-    return s / 2.0 * np.array(arms, dtype=float)
 
 
 def error_and_estimate(s, tolerance):

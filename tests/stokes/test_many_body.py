@@ -15,23 +15,11 @@ from dustfall.stokes.many_body import (
     plan_scene,
     solve,
 )
+from tests.stokes.clusters import chain, six, triangle
 
 
 def pair(s):
     return np.array([[0.0, 0.0, 0.0], [0.0, 0.0, s / 2.0]])
-
-
-def triangle(s):
-    return s / 2.0 * np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, np.sqrt(0.75), 0.0]])
-
-
-def chain(s):
-    return s / 2.0 * np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-
-
-def six(s):
-    arms = [[0, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]]
-    return s / 2.0 * np.array(arms, dtype=float)
 
 
 def ratio(centres, axis, tolerance):
