@@ -96,7 +96,8 @@ def _couple(block, pair, here, there):
         y = here[_L + lane] - there[_L + lane]
         z = here[2 * _L + lane] - there[2 * _L + lane]
         # The floor keeps the mobility of two coincident neighbours positive definite.
-        inverse = 1 / np.sqrt(max(x * x + y * y + z * z, 1e-12))
+        distance2 = max(x * x + y * y + z * z, 1e-12)
+        inverse = 1 / np.sqrt(distance2)
         square = inverse * inverse
         if inverse < 1.0:
             across = 0.375 * inverse * (1 + square / 6)
@@ -113,7 +114,8 @@ def _couple(block, pair, here, there):
         block[6 * _L + lane] = along * x * z
         block[7 * _L + lane] = along * y * z
         block[8 * _L + lane] = across + along * z * z
-        # Overlapping neighbours keep the other coefficients of contact.
+        # Overlapping neighbours keep the other coefficients of contact: what they induce in each
+        # other fades with their distance.
         inverse = min(inverse, 1.0)
         square = inverse * inverse
         cube = 0.375 * inverse * square
@@ -121,9 +123,9 @@ def _couple(block, pair, here, there):
         pair[_L + lane] = y
         pair[2 * _L + lane] = z
         # Gradient of the Rotne-Prager velocity with Faxen's a^2/10 of the strain, see _gradient.
-        pair[3 * _L + lane] = -0.4 * cube * square
-        pair[4 * _L + lane] = cube * square * (2 * square - 3)
-        pair[5 * _L + lane] = cube * (1 - 0.4 * square)
+        p, s = -0.4 * cube * square, cube * square * (2 * square - 3)
+        pair[3 * _L + lane], pair[4 * _L + lane] = p, s
+        pair[5 * _L + lane] = -(2 * p + s * distance2) / 3
         pair[6 * _L + lane] = -cube
 
 

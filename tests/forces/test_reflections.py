@@ -108,8 +108,12 @@ def test_without_reflections_the_rotne_prager_inverse_is_left():
     np.testing.assert_allclose(compiled, plain, rtol=1e-11, atol=1e-11)
 
 
-def test_force_keeps_the_symmetries_of_stokes_flow():
+@pytest.mark.parametrize("overlap", [False, True])
+def test_force_keeps_the_symmetries_of_stokes_flow(overlap):
     neighbours = random_neighbours(70)
+    if overlap:  # of neighbours with each other, and with the reference sphere
+        neighbours[:, 1] = neighbours[:, 0] + 0.05 * neighbours[:, 2]
+        neighbours[:20, 3] *= 0.02
     force = Reflections().predict(neighbours)
     c, s = np.cos(0.7), np.sin(0.7)
     turn = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
