@@ -75,8 +75,12 @@ def spherical_coordinates(positions) -> np.ndarray:
     that the paper's correlation figure fits).
     """
     x, y, z = np.moveaxis(np.asarray(positions, dtype=float), -1, 0)
-    rho = np.hypot(x, y)
-    return np.stack([np.hypot(rho, z), np.arctan2(y, x), np.arctan2(rho, z)], axis=-1)
+    square = x * x + y * y
+    coordinates = np.empty((*x.shape, 3))
+    np.sqrt(square + z * z, out=coordinates[..., 0])
+    np.arctan2(y, x, out=coordinates[..., 1])
+    np.arctan2(np.sqrt(square), z, out=coordinates[..., 2])
+    return coordinates
 
 
 def check_neighbours(neighbours) -> np.ndarray:
@@ -115,27 +119,27 @@ def sort_by_distance(neighbours):
     square = np.empty(NEIGHBOURS)
     order = np.empty(NEIGHBOURS, np.int64)
     for m in range(neighbours.shape[0]):
-        scene = neighbours[m]
         for j in range(NEIGHBOURS):
-            square[j] = scene[j, 0] ** 2 + scene[j, 1] ** 2 + scene[j, 2] ** 2
+            own = neighbours[m, j, 0] ** 2 + neighbours[m, j, 1] ** 2 + neighbours[m, j, 2] ** 2
             i = j
-            while i > 0 and _is_before(scene, square, j, order[i - 1]):
-                order[i] = order[i - 1]
+            while i > 0 and (
+                own < square[i - 1]
+                or (own == square[i - 1] and _is_before(neighbours, m, j, order[i - 1]))
+            ):
+                square[i], order[i] = square[i - 1], order[i - 1]
                 i -= 1
-            order[i] = j
+            square[i], order[i] = own, j
         for i in range(NEIGHBOURS):
             for k in range(3):
-                result[m, i, k] = scene[order[i], k]
+                result[m, i, k] = neighbours[m, order[i], k]
     return result
 
 
 @njit(cache=True, nogil=True)
-def _is_before(scene, square, j, i):
-    if square[j] != square[i]:
-        return square[j] < square[i]
+def _is_before(neighbours, m, j, i):
     for k in (1, 0, 2):
-        if scene[j, k] != scene[i, k]:
-            return scene[j, k] < scene[i, k]
+        if neighbours[m, j, k] != neighbours[m, i, k]:
+            return neighbours[m, j, k] < neighbours[m, i, k]
     return False
 
 
