@@ -6,6 +6,8 @@ import netCDF4
 import numpy as np
 from numba import njit
 
+from dustfall.sedimentation.neighbours import sort_by_cell
+
 SPHERE_VOLUME = np.pi / 6
 """Volume of a particle, d_p³."""
 
@@ -43,7 +45,8 @@ def random_positions(rng: np.random.Generator, particles: int, volume_fraction: 
 
     Returns
     -------
-    (n, 3) positions in d_p, within the cube of side `cube_side(particles, volume_fraction)`
+    (n, 3) positions in d_p, within the cube of side `cube_side(particles, volume_fraction)`, cell
+    by cell: what is near in space is near in memory, which a step of a large run needs
 
     Raises
     ------
@@ -65,7 +68,7 @@ def random_positions(rng: np.random.Generator, particles: int, volume_fraction: 
         draw = rng.random((particles, 3)) * side
         placed = _add(draw, position, placed, head, following, side, cells)
         draws += particles
-    return position
+    return position[sort_by_cell(position, side)[1]]
 
 
 def read_start(path: str | Path, particles: int, volume_fraction: float):
