@@ -9,7 +9,7 @@ from dustfall.forces.training import (
     TrainingSettings,
     check_samples,
     score,
-    train_component,
+    train_networks,
     training_scenes,
 )
 
@@ -49,36 +49,35 @@ def cross_validate(
     neighbours, force = check_samples(neighbours, force, 2 * folds)
     scenes, _ = training_scenes(kind, neighbours, radial_input, seed)
     dealt = np.random.default_rng([seed, _FOLDS]).permutation(len(neighbours)) % folds
-    results = []
-    for fold in range(folds):
+    splits = [
+        (np.flatnonzero(dealt != fold), np.flatnonzero(dealt == fold)) for fold in range(folds)
+    ]
+    trials = [[seed, fold + 1] for fold in range(folds)]
 
-        def report(epoch, done=fold * settings.epochs):
-            if progress:
-                progress(done + epoch, folds * settings.epochs)
+    def report(epoch):
+        if progress:
+            progress(epoch, settings.epochs)
 
-        training, validation = np.flatnonzero(dealt != fold), np.flatnonzero(dealt == fold)
-        network, history = train_component(
-            kind,
-            scenes,
-            force,
-            component,
-            layers,
-            training,
-            validation,
-            settings,
-            [seed, fold + 1],
-            report,
-            device,
-        )
-        scores = score(network, scenes, force, component, validation)
-        results.append({"fold": fold, **scores, "epochs": history.best_epoch})
+    trained = train_networks(
+        kind, scenes, force, component, layers, splits, settings, trials, report, device
+    )
     if progress:
-        progress(folds * settings.epochs, folds * settings.epochs)
+        progress(settings.epochs, settings.epochs)
+    results = [
+        {
+            "fold": fold,
+            **score(network, scenes, force, component, validation),
+            "epochs": history.best_epoch,
+        }
+        for fold, ((network, history), (_, validation)) in enumerate(
+            zip(trained, splits, strict=True)
+        )
+    ]
     return {
         "component": component,
         "kind": kind,
         "layers": layers,
-        "parameters": network.parameters,
+        "parameters": trained[0][0].parameters,
         "folds": results,
     }
 

@@ -13,7 +13,7 @@ from dustfall import __version__
 from dustfall.forces.features import COMPONENTS, KINDS, RADIAL_INPUTS, USES, Scenes, describe
 from dustfall.forces.frames import NEIGHBOURS, check_neighbours
 from dustfall.forces.models import FORMAT, VERSION, LearnedModel, Network, parse_layers
-from dustfall.forces.networks import build
+from dustfall.forces.networks import Affine, build
 
 VALIDATION_SHARE = 0.1
 """Share of the samples kept for validation (paper, section "Deterministic model")."""
@@ -87,61 +87,90 @@ class History:
     validation_error: list[float]
 
     @property
-    def best_epoch(self) -> int:
-        """Epoch of the smallest validation error, whose weights are kept."""
-        return self.epochs[int(np.argmin(self.validation_error))]
+    def best_epoch(self) -> int | None:
+        """Epoch of the smallest validation error, whose weights are kept; None: none was finite."""
+        finite = [error for error in self.validation_error if np.isfinite(error)]
+        return self.epochs[self.validation_error.index(min(finite))] if finite else None
 
 
 def fit(
-    network: nn.Module,
+    networks: nn.Module,
     tensors: list[torch.Tensor],
-    training: torch.Tensor,
-    validation: torch.Tensor,
+    splits: list[tuple[np.ndarray, np.ndarray]],
     settings: TrainingSettings,
-    generator: torch.Generator,
+    generators: list[torch.Generator],
     report=None,
-) -> tuple[list[int], list[float]]:
-    """Train `network` in place and leave it at its best validation error.
+) -> list[History]:
+    """Train k networks side by side, in place, and leave each at its best validation error.
 
-    `tensors` are the normalised inputs (m, 5, F), envelope (m, uses) and target (m, 1 or 2);
-    `training` and `validation` are rows of them. `report(epoch)` is called after each epoch.
-    Returns the validated epochs and their mean squared errors, in the target's unit. Raises
-    FloatingPointError when no validation error was finite.
+    `tensors` are the normalised inputs (k, m, 5, F), envelope (k, m, uses) and target
+    (k, m, 1 or 2); `splits` are each network's training and validation rows, `generators` shuffle
+    them. In an epoch all take as many steps as the smallest training set gives. `report(epoch)` is
+    called after each epoch. Returns the histories, in the target's unit. Raises FloatingPointError
+    when no validation error of a network was finite.
     """
     *given, target = tensors
-    batch = min(settings.batch_size or len(training), len(training))
+    size = min(len(training) for training, _ in splits)
+    batch = min(settings.batch_size or size, size)
+    side = torch.arange(len(splits))[:, None]
+    training = [torch.from_numpy(rows) for rows, _ in splits]
+    validation, counts = _padded([rows for _, rows in splits])
+    kept = copy.deepcopy(networks.state_dict())
+    histories = [History([], []) for _ in splits]
+    active = list(range(len(splits)))
     optimiser = torch.optim.AdamW(
-        network.parameters(), settings.learning_rate, weight_decay=settings.weight_decay, fused=True
+        networks.parameters(),
+        settings.learning_rate,
+        weight_decay=settings.weight_decay,
+        fused=True,
     )
-    epochs, errors, best = [], [], None
     for epoch in range(1, settings.epochs + 1):
         if settings.schedule == "cosine":
             share = (epoch - 1) / settings.epochs
             rate = settings.learning_rate * 0.5 * (1 + np.cos(np.pi * share))
             optimiser.param_groups[0]["lr"] = rate
-        shuffled = training[torch.randperm(len(training), generator=generator)]
-        for start in range(0, len(training) - batch + 1, batch):
-            rows = shuffled[start : start + batch]
-            loss = nn.functional.mse_loss(network(*(t[rows] for t in given)), target[rows])
+        shuffled = torch.stack(
+            [
+                rows[torch.randperm(len(rows), generator=generator)[:size]]
+                for rows, generator in zip(training, generators, strict=True)
+            ]
+        )
+        *shown, aim = (tensor[side, shuffled] for tensor in tensors)
+        for start in range(0, size - batch + 1, batch):
+            rows = slice(start, start + batch)
+            error = networks(*(t[:, rows] for t in shown)) - aim[:, rows]
+            loss = error.square().mean((1, 2)).sum()  # each network's gradient is its own error's
             optimiser.zero_grad()
             loss.backward()
             optimiser.step()
         if epoch % settings.validate_every == 0 or epoch == settings.epochs:
             with torch.no_grad():
-                predicted = network(*(t[validation] for t in given)).double()
-                error = float((predicted - target[validation]).square().mean())
-            epochs.append(epoch)
-            errors.append(error)
-            if error <= min(errors):
-                best = epoch, copy.deepcopy(network.state_dict())
-            elif best and epoch - best[0] >= settings.patience:
+                error = networks(*(t[side, validation] for t in given)).double()
+                error = (error - target[side, validation]).square().mean(2).cpu()
+            for k in list(active):
+                history = histories[k]
+                history.epochs.append(epoch)
+                history.validation_error.append(float(error[k, : counts[k]].mean()))
+                if history.best_epoch == epoch:
+                    for name, value in networks.state_dict().items():
+                        kept[name][k] = value[k]
+                elif epoch - (history.best_epoch or epoch) >= settings.patience:
+                    active.remove(k)
+            if not active:
                 break
         if report:
             report(epoch)
-    if best is None:
+    if any(history.best_epoch is None for history in histories):
         raise FloatingPointError("training diverged: no validation error was finite")
-    network.load_state_dict(best[1])
-    return epochs, errors
+    networks.load_state_dict(kept)
+    return histories
+
+
+def _padded(sets: list[np.ndarray]) -> tuple[torch.Tensor, list[int]]:
+    """Rows (k, largest) of sets of rows, the shorter ones filled up, and their sizes."""
+    counts = [len(rows) for rows in sets]
+    filled = [np.pad(rows, (0, max(counts) - len(rows)), mode="edge") for rows in sets]
+    return torch.from_numpy(np.stack(filled)), counts
 
 
 def train_model(
@@ -181,18 +210,9 @@ def train_model(
             if progress:
                 progress(done + epoch, len(COMPONENTS) * settings.epochs)
 
-        networks[component], history[component] = train_component(
-            kind,
-            scenes,
-            force,
-            component,
-            layers,
-            training,
-            validation,
-            settings,
-            [seed],
-            report,
-            device,
+        split = [(training, validation)]
+        ((networks[component], history[component]),) = train_networks(
+            kind, scenes, force, component, layers, split, settings, [[seed]], report, device
         )
         scores[component] = score(networks[component], scenes, force, component, validation)
     if progress:
@@ -225,59 +245,61 @@ def train_model(
     return LearnedModel(header, networks, history)
 
 
-def train_component(
+def train_networks(
     kind: str,
     scenes: Scenes,
     force: np.ndarray,
     component: str,
     layers: str,
-    training: np.ndarray,
-    validation: np.ndarray,
+    splits: list[tuple[np.ndarray, np.ndarray]],
     settings: TrainingSettings,
-    trial: list[int],
+    trials: list[list[int]],
     report=None,
     device: str = "cpu",
-) -> tuple[Network, History]:
-    """Train one component's network on the rows `training`; return it with its history.
+) -> list[tuple[Network, History]]:
+    """Train a network of one component on each split; return them with their histories.
 
-    Initial weights and batches hang on `trial` (integers) and the component alone.
+    A split is the rows to train on and those to validate with. Initial weights and batches of a
+    network hang on its trial (integers) and the component alone.
     """
     if device != "cpu" and not torch.cuda.is_available():
         raise ValueError(f"device is {device!r}, but PyTorch finds no GPU here; use 'cpu'")
-    entropy = [*trial, _TRIAL, list(COMPONENTS).index(component)]
-    (state,) = np.random.SeedSequence(entropy).generate_state(1, np.uint64)
-    generator = torch.Generator().manual_seed(int(state))
+    generators = [
+        _generator([*trial, _TRIAL, list(COMPONENTS).index(component)]) for trial in trials
+    ]
     target = scenes.residual(force, component)
+    features = scenes.inputs.shape[2]
     # Training rows alone set the normalisation; validation rows must not leak into it.
-    unit = float(np.sqrt(np.mean(target[training] ** 2))) or 1.0
-    rows = scenes.inputs[training].reshape(-1, scenes.inputs.shape[2])
-    mean, scale = rows.mean(axis=0), rows.std(axis=0)
-    scale[scale == 0.0] = 1.0
+    units = [float(np.sqrt(np.mean(target[rows] ** 2))) or 1.0 for rows, _ in splits]
+    seen = [scenes.inputs[rows].reshape(-1, features) for rows, _ in splits]
+    means, scales = [rows.mean(axis=0) for rows in seen], [rows.std(axis=0) for rows in seen]
+    for scale in scales:
+        scale[scale == 0.0] = 1.0
+    normal = [(scenes.inputs - mean) / scale for mean, scale in zip(means, scales, strict=True)]
     tensors = [
-        torch.from_numpy(np.ascontiguousarray(array, dtype=np.float32)).to(device)
-        for array in ((scenes.inputs - mean) / scale, scenes.envelope, target / unit)
+        torch.from_numpy(np.stack(arrays).astype(np.float32)).to(device)
+        for arrays in (normal, [scenes.envelope] * len(splits), [target / unit for unit in units])
     ]
     with one_thread():
-        network = build(kind, layers, component, generator).to(device)
-        epochs, errors = fit(
-            network,
-            tensors,
-            torch.from_numpy(training),
-            torch.from_numpy(validation),
-            settings,
-            generator,
-            report,
-        )
-    blocks = [
-        [
-            tuple(p.detach().cpu().numpy().copy() for p in layer.parameters())
-            for layer in block
-            if isinstance(layer, nn.Linear)
+        networks = build(kind, layers, component, generators).to(device)
+        histories = fit(networks, tensors, splits, settings, generators, report)
+    trained = []
+    for k, (mean, scale, unit, history) in enumerate(
+        zip(means, scales, units, histories, strict=True)
+    ):
+        blocks = [
+            [layer.of_network(k) for layer in block if isinstance(layer, Affine)]
+            for block in networks.blocks
         ]
-        for block in network.blocks
-    ]
-    history = History(epochs, [error * unit**2 for error in errors])
-    return Network(component, USES[KINDS[kind].blocks], blocks, mean, scale, unit), history
+        errors = [error * unit**2 for error in history.validation_error]
+        network = Network(component, USES[KINDS[kind].blocks], blocks, mean, scale, unit)
+        trained.append((network, History(history.epochs, errors)))
+    return trained
+
+
+def _generator(entropy: list[int]) -> torch.Generator:
+    (state,) = np.random.SeedSequence(entropy).generate_state(1, np.uint64)
+    return torch.Generator().manual_seed(int(state))
 
 
 def score(

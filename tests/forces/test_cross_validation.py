@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from dustfall.forces import TrainingSettings, choose_winner, cross_validate
+from dustfall.forces.training import train_networks, training_scenes
 
 SETTINGS = TrainingSettings(batch_size=128, epochs=4, validate_every=2)
 
@@ -74,3 +75,22 @@ def test_winner_needs_both_components_and_equal_folds():
         choose_winner([table[0], result("lateral", "9/9", 9, [1, 2, 3])])
     with pytest.raises(ValueError, match="no cross-validation results"):
         choose_winner([])
+
+
+def test_a_fold_learns_the_same_alone_and_beside_others(few):
+    neighbours, force = few
+    scenes, _ = training_scenes("idnn", neighbours, "logarithm", 1)
+    splits = [(np.arange(100 * k, 600), np.arange(100 * k)) for k in (1, 2)]
+    trials = [[1, 1], [1, 2]]
+
+    def errors(chosen):
+        trained = train_networks(
+            "idnn", scenes, force, "lateral", "8/6", [splits[k] for k in chosen], SETTINGS,
+            [trials[k] for k in chosen],
+        )  # fmt: skip
+        return [history.validation_error for _, history in trained]
+
+    # The second trains on the fewest samples, which sets the steps of both.
+    assert errors([1])[0] == pytest.approx(errors([0, 1])[1], rel=1e-5)
+    assert errors([0, 1]) == errors([0, 1])
+    assert errors([0, 1])[0] != errors([0, 1])[1]

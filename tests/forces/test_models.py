@@ -24,13 +24,14 @@ def test_compiled_network_equals_pytorch(models, kind):
     neighbours = random_neighbours(333, seed=5)
     scenes = describe(kind, neighbours, header["radial_input"], header["largest_distance"])
     for component, network in model.networks.items():
-        module = build(kind, header["layers"][component], component, torch.Generator()).double()
+        module = build(kind, header["layers"][component], component, [torch.Generator()]).double()
         weights = [array for block in network.blocks for layer in block for array in layer]
         with torch.no_grad():
             for parameter, array in zip(module.parameters(), weights, strict=True):
-                parameter.copy_(torch.from_numpy(array))
-            inputs = torch.from_numpy((scenes.inputs - network.mean) / network.scale)
-            expected = network.unit * module(inputs, torch.from_numpy(scenes.envelope)).numpy()
+                parameter.copy_(torch.from_numpy(array.T.reshape(parameter.shape)))
+            inputs = torch.from_numpy((scenes.inputs - network.mean) / network.scale)[None]
+            output = module(inputs, torch.from_numpy(scenes.envelope)[None])
+            expected = network.unit * output[0].numpy()
         compiled = network.residual(scenes.inputs, scenes.envelope)
         np.testing.assert_allclose(compiled, expected, rtol=0, atol=1e-6)
 
