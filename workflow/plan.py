@@ -1,6 +1,7 @@
 """Which artefacts a configuration asks for, and how they are named."""
 
 from decimal import Decimal
+from itertools import chain, repeat
 from math import ceil
 from typing import NamedTuple
 from zlib import crc32
@@ -88,7 +89,6 @@ def learning_curve(config: dict) -> list[str]:
 
     The IDNN has the layers of the paper.
     """
-    share = 1 - config["dataset"]["test_share"]
     return [
         f"{model}-{layers.replace('/', '_')}-{number}"
         for model, layers in zip(
@@ -96,9 +96,20 @@ def learning_curve(config: dict) -> list[str]:
             (config["idnn"]["layers_of"]["anchored"], config["idnn"]["ablation_layers"]),
             strict=True,
         )
-        for number in config["idnn"]["learning_curve"]
-        if number <= share * sum(config["scenes"]["number"][law] for law in laws(config, model))
+        for number in sorted(
+            {
+                min(number, training_scenes(config, model))
+                for number in config["idnn"]["learning_curve"]
+            }
+        )
     ]
+
+
+def training_scenes(config: dict, model: str) -> int:
+    """Number of scenes that a model has for training: of its laws, without the test scenes."""
+    share = config["dataset"]["test_share"]
+    drawn = (config["scenes"]["number"][law] for law in laws(config, model))
+    return sum(number - round(share * number) for number in drawn)
 
 
 def ablation(config: dict) -> list[str]:
@@ -125,7 +136,7 @@ def training(config: dict, model: str) -> dict:
 
 
 def cases(config: dict) -> dict[str, Case]:
-    """Every sedimentation case by its name."""
+    """Every sedimentation case by its name; of the first seed all, then of the next one."""
     settle = config["sedimentation"]
     galileo = settle["galileo"]
     found = [
@@ -141,9 +152,13 @@ def cases(config: dict) -> dict[str, Case]:
             for phi in settle["volume_fractions"]
         ),
     ]
-    seeds = range(1, settle["seeds"] + 1)
+    numbers = chain(settle["seeds"], repeat(settle["seeds"][-1]))
+    seeds = dict(zip(settle["particles"], numbers, strict=False))
     return {
-        case.name: case for seed in seeds for case in (one._replace(seed=seed) for one in found)
+        case.name: case
+        for seed in range(1, max(settle["seeds"]) + 1)
+        for case in (one._replace(seed=seed) for one in found)
+        if seed <= seeds.get(case.particles, 1)
     }
 
 

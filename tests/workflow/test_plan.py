@@ -28,7 +28,7 @@ FIGURES = [
 
 def test_the_paper_takes_the_expected_jobs_and_fewer_than_a_thousand(project):
     jobs = project.plan("--", "all")
-    shards = 2 * (14_000 // 2000) + 1
+    shards = 2 * (14_000 // 2000) + 4_000 // 2000
     expected = {
         "configuration": 1,
         "templates": 1,
@@ -42,13 +42,14 @@ def test_the_paper_takes_the_expected_jobs_and_fewer_than_a_thousand(project):
         "sweep": 24,
         "winner": 1,
         "model": 5,
-        # The anchored IDNN on up to 26,100 scenes of three laws, the IDNN on up to 12,600 of one.
+        # The anchored IDNN on up to 28,800 scenes of three laws, the IDNN on up to 12,600 of one.
         "trial": 8 + 7 + 9,
         "learning_curve": 1,
         "ablation": 1,
         "evaluation": 1,
-        # 3 numbers of particles, 6 volume fractions, 2 more Galileo numbers, 3 models to compare
-        "sedimentation": 3 * 6 + 2 + 3 * 6,
+        # 3 numbers of particles, the fewest from 3 starts, 6 volume fractions, 2 more Galileo
+        # numbers, 3 models to compare
+        "sedimentation": (3 + 1 + 1) * 6 + 2 + 3 * 3 * 6,
         "steady_state": 1,
         "independence_of_n": 1,
         "neighbour_changes": 1,
@@ -67,7 +68,7 @@ def test_figures_is_a_target_that_leaves_the_tables_out(project):
 
 
 def test_exports_is_a_target_with_every_case(project):
-    assert project.plan("--", "exports")["export"] == 3 * 6 + 2 + 3 * 6
+    assert project.plan("--", "exports")["export"] == 5 * 6 + 2 + 9 * 6
 
 
 @pytest.mark.parametrize(("number", "size"), [(120, 40), (121, 40), (119, 40), (120, 1000)])
@@ -101,19 +102,27 @@ def test_case_names_tell_cases_apart():
 
 
 def test_cases_of_the_galileo_series_are_added_once():
-    assert len(plan.cases(configure({"sedimentation": {"models": []}}))) == 20
-    apart = configure({"sedimentation": {"models": [], "galileo": {"particles": 500}}})
+    one = {"models": [], "seeds": [1]}
+    assert len(plan.cases(configure({"sedimentation": one}))) == 20
+    apart = configure({"sedimentation": one | {"galileo": {"particles": 500}}})
     assert len(plan.cases(apart)) == 21
 
 
 def test_further_seeds_leave_the_names_of_the_first_as_they_are():
-    one = plan.cases(configure({}))
-    three = plan.cases(configure({"sedimentation": {"seeds": 3}}))
+    one = plan.cases(configure({"sedimentation": {"seeds": [1]}}))
+    three = plan.cases(configure({"sedimentation": {"seeds": [3]}}))
     assert len(three) == 3 * len(one)
     assert list(three)[: len(one)] == list(one)
     assert plan.Case(1000, 1e-3, 1.0, 2).name == "n1000_phi1e-03_ga1_seed2"
     config = configure({})
     assert len({plan.case_seed(config, case) for case in three}) == len(three)
+
+
+def test_each_number_of_particles_has_its_number_of_seeds_the_last_for_all_that_follow():
+    settle = {"particles": [10, 20, 30], "seeds": [3, 2], "galileo": {"particles": 500}}
+    cases = plan.cases(configure({"sedimentation": settle})).values()
+    seeds = {n: max(case.seed for case in cases if case.particles == n) for n in (10, 20, 30, 500)}
+    assert seeds == {10: 3, 20: 2, 30: 2, 500: 1}
 
 
 def test_start_file_may_be_one_for_each_case():
@@ -135,6 +144,14 @@ def test_trial_names_are_file_names_and_lead_back_to_their_layers():
     assert [plan.trial_layers(name) for name in names[:12]] == config["idnn"]["layers"]
 
 
+def test_learning_curve_ends_with_all_scenes_where_a_model_has_fewer():
+    numbers = {"uniform": 120, "ball": 40, "contact": 20}
+    config = configure({"scenes": {"number": numbers}, "idnn": {"learning_curve": [50, 500]}})
+    assert [name.rsplit("-", 1)[1] for name in plan.learning_curve(config)] == (
+        ["50", "162", "50", "108"]
+    )
+
+
 def test_every_case_starts_from_its_own_random_numbers():
     config = configure({"sedimentation": {"models": []}})
     seeds = [plan.case_seed(config, case.start) for case in plan.cases(config).values()]
@@ -144,7 +161,7 @@ def test_every_case_starts_from_its_own_random_numbers():
 
 
 def test_compared_models_share_the_starts_of_the_smallest_cases():
-    config = configure({"sedimentation": {"models": ["isolated", "idnn"], "seeds": 2}})
+    config = configure({"sedimentation": {"models": ["isolated", "idnn"], "seeds": [2]}})
     cases = plan.cases(config)
     compared = {name: case for name, case in cases.items() if case.compared_model}
     assert len(compared) == 6 * 2
