@@ -103,8 +103,8 @@ def describe(kind: str, neighbours: np.ndarray, radial_input: str, largest: floa
     natural logarithm. `largest` is the largest distance trained on: the networks see neighbours
     beyond it there. The outputs fade, so that a reference sphere whose neighbours all move away
     goes over into Stokes drag: with spherical coordinates as 1/distance of the nearest neighbour,
-    from `largest` on; with unit vectors each use as 1/distance of its (nearest) neighbour, and
-    squared on the reflections, whose error falls sooner.
+    from `largest` on; with unit vectors each use as 1/distance of its (nearest) neighbour, on
+    the reflections, whose error falls sooner, as its fourth power.
     """
     layout = KINDS[kind]
     if layout.ordered:
@@ -114,7 +114,7 @@ def describe(kind: str, neighbours: np.ndarray, radial_input: str, largest: floa
     first = USES[layout.blocks][:, 1]
     if layout.unit_vectors:
         inputs = _unit_vectors(seen, largest)
-        power = 2 if layout.baseline == "reflections" else 1
+        power = 4 if layout.baseline == "reflections" else 1
         envelope = inputs[:, first, 0] ** power
     else:
         inputs = spherical_coordinates(seen)

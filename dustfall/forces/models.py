@@ -17,7 +17,7 @@ from dustfall.forces.frames import check_neighbours
 from dustfall.forces.inference import evaluate
 
 FORMAT = "dustfall force model"
-VERSION = 2
+VERSION = 3
 SHIPPED = Path(__file__).parent / "data" / "anchored.safetensors"
 
 ACTIVATION = {"streamwise": "relu", "lateral": "tanh"}
