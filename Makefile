@@ -15,7 +15,7 @@ run: environment
 	$(VENV)/bin/snakemake --configfile $(CONFIG) -- all
 
 test: environment
-	$(VENV)/bin/python -m pytest
+	$(VENV)/bin/python -m pytest -n auto --dist loadfile
 
 # Made anew when it is missing, or when requirements.txt is not the one that it was made from.
 environment:

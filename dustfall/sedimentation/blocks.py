@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
-BLOCK = 1024
+BLOCK = 4096
 """Particles a block: its arrays stay in the cache of a core, and calls cost little beside work."""
 
 
