@@ -14,7 +14,7 @@ from dustfall.analysis.references import (
     PAPER_VORONOI_VARIANCE,
     POISSON_VORONOI_VARIANCE,
 )
-from dustfall.analysis.settling import CASE, case_of, correlation_length
+from dustfall.analysis.settling import CASE, case_of, correlation_length, from_time
 from dustfall.sedimentation.start import cube_side, random_positions
 
 VOLUME_EDGES = np.linspace(0, 4, 41)
@@ -61,24 +61,24 @@ def voronoi_volumes(positions, cell_lengths) -> np.ndarray:
     return volumes
 
 
-def snapshot_volumes(
-    trajectory: xr.Dataset, start=0.0, stop=np.inf, snapshots=50, progress=None
-) -> np.ndarray:
-    """Voronoï volumes over their mean (k, n) of at most `snapshots` frames of a trajectory.
+def cell_volumes(trajectory: xr.Dataset, start=0.0, snapshots=50, progress=None) -> xr.Dataset:
+    """Voronoï volumes over their mean, in the first frame and some frames from `start` [tau] on.
 
     Parameters: `trajectory` with coordinates (frame, atom, spatial), cell_lengths (frame,
-    cell_spatial) and time (frame) [tau]; frames from `start` to `stop` [tau], evenly spaced.
-    Raises ValueError where no frame lies between them.
+    cell_spatial) and time (frame) [tau]; `snapshots`, the most frames from `start` on, evenly
+    spaced. Returns time (frame) [tau] and volume (frame, atom), with the trajectory's attributes.
+    Raises ValueError where no frame lies after `start`.
     """
     time = np.asarray(trajectory["time"], dtype=float)
-    frames = np.flatnonzero((time >= start) & (time <= stop))
-    if not frames.size:
+    later = np.flatnonzero(time >= start)
+    if not later.size:
         raise ValueError(
-            f"no frame lies between {start} and {stop} tau; the trajectory has "
-            f"{time.min()} to {time.max()} tau"
+            f"no frame lies at or after {start} tau; the trajectory has {time.min()} to "
+            f"{time.max()} tau"
         )
-    if frames.size > snapshots:
-        frames = frames[np.linspace(0, frames.size - 1, snapshots).round().astype(int)]
+    if later.size > snapshots:
+        later = later[np.linspace(0, later.size - 1, snapshots).round().astype(int)]
+    frames = np.union1d([0], later)
     volumes = []
     for done, frame in enumerate(frames, start=1):
         lengths = np.asarray(trajectory["cell_lengths"][frame], dtype=float)
@@ -86,14 +86,16 @@ def snapshot_volumes(
         volumes.append(volume / volume.mean())
         if progress:
             progress(done, frames.size)
-    return np.array(volumes)
+    data = {"time": ("frame", time[frames]), "volume": (("frame", "atom"), np.array(volumes))}
+    return xr.Dataset(data, attrs=trajectory.attrs)
 
 
-def pooled_volumes(trajectories, start: float, snapshots=50, progress=None) -> np.ndarray:
-    """Normalised volumes (k, n times runs) of runs of one case that differ by their seed."""
-    volumes = [
-        snapshot_volumes(t, start, snapshots=snapshots, progress=progress) for t in trajectories
-    ]
+def pooled_volumes(runs, start: float) -> np.ndarray:
+    """Normalised volumes (k, n times runs) from `start` [tau] on, of runs that differ by seed.
+
+    `runs` as `cell_volumes` returns them.
+    """
+    volumes = [from_time(run, start, "frame")["volume"].values for run in runs]
     shortest = min(map(len, volumes))
     return np.concatenate([v[-shortest:] for v in volumes], axis=1)
 
@@ -116,6 +118,18 @@ def random_sphere_variance(
     half = stats.t.ppf(0.975, clouds - 1) * np.std(found, ddof=1) / np.sqrt(clouds)
     mean = float(np.mean(found))
     return {"value": mean, "low": mean - half, "high": mean + half}
+
+
+def random_sphere_table(
+    volume_fractions: Iterable[float], seed: int, particles=10_000, clouds=REFERENCE_CLOUDS
+) -> pd.DataFrame:
+    """Tabulate `random_sphere_variance`: volume_fraction, n, value, low, high."""
+    rows = [
+        {"volume_fraction": phi, "n": particles}
+        | random_sphere_variance(phi, particles, seed, clouds)
+        for phi in volume_fractions
+    ]
+    return pd.DataFrame(rows)
 
 
 def gamma_pdf(volume, shape, scale) -> np.ndarray:
@@ -196,28 +210,25 @@ def _interval(by_snapshot, by_particle, seed, length, correlated=1.0):
     return np.fmin(low, mean - half), np.fmax(high, mean + half)
 
 
-def voronoi_pdf_table(
-    trajectories: Iterable[xr.Dataset], start: float, seed: int, snapshots=50, progress=None
-) -> pd.DataFrame:
+def voronoi_pdf_table(cells: Iterable[xr.Dataset], start: float, seed: int) -> pd.DataFrame:
     """Tabulate the p.d.f. of normalised Voronoï volumes for each Galileo number.
 
-    Parameters: `trajectories` of one volume fraction, one or, with several seeds, more for each
-    Galileo number; `start` of the steady state [tau]; `seed` of the bootstrap; `snapshots`, the
-    most frames used of each.
+    Parameters: `cells` as `cell_volumes` returns them, of one volume fraction, one or, with several
+    seeds, more for each Galileo number; `start` of the steady state [tau]; `seed` of the bootstrap.
 
     Returns the columns source, galileo_multiple, volume, density, low, high. Sources: "steady
     state" (one curve a Galileo number, as a multiple of the lowest), "random start" (first frames
     at the lowest), "gamma, k = 5, theta = 0.2" and "gamma, k = 5.59".
 
-    Raises ValueError where there is no trajectory, no frame after `start` or an attribute missing.
+    Raises ValueError where there are no cells, no frame after `start` or an attribute missing.
     """
-    by_galileo = {case[-1]: runs for case, runs in sorted(_cases(trajectories).items())}
+    by_galileo = {case[-1]: runs for case, runs in sorted(_cases(cells).items())}
     lowest = min(by_galileo)
-    first = [trajectory.isel(frame=[0]) for trajectory in by_galileo[lowest]]
+    first = [run.isel(frame=[0]) for run in by_galileo[lowest]]
     initial = volume_distribution(pooled_volumes(first, 0.0), seed)
     tables = [initial.assign(source="random start")]
     for galileo, runs in by_galileo.items():
-        volumes = pooled_volumes(runs, start, snapshots, progress)
+        volumes = pooled_volumes(runs, start)
         tables.append(
             volume_distribution(volumes, seed).assign(
                 source="steady state", galileo_multiple=round(galileo / lowest, 6)
@@ -234,48 +245,46 @@ def voronoi_pdf_table(
     return table[["source", "galileo_multiple", "volume", "density", "low", "high"]]
 
 
-def _cases(trajectories) -> dict[tuple, list]:
-    """Trajectories by case: those of one case differ by their seed."""
+def _cases(cells) -> dict[tuple, list]:
+    """Cells by case: those of one case differ by their seed."""
     cases: dict[tuple, list] = {}
-    for trajectory in trajectories:
-        cases.setdefault(tuple(case_of(trajectory).values()), []).append(trajectory)
+    for run in cells:
+        cases.setdefault(tuple(case_of(run).values()), []).append(run)
     if not cases:
-        raise ValueError("there are no trajectories: at least one is needed")
+        raise ValueError("there are no cells: those of at least one run are needed")
     return cases
 
 
 def voronoi_variance_table(
-    trajectories: Iterable[xr.Dataset],
+    cells: Iterable[xr.Dataset],
     steady: pd.DataFrame,
+    spheres: pd.DataFrame,
     start: float,
     seed: int,
-    snapshots=50,
-    reference_particles=10_000,
-    progress=None,
 ) -> pd.DataFrame:
     """Tabulate the variance of normalised Voronoï volumes against the steady settling velocity.
 
-    Parameters: `trajectories`, `steady` as `steady_state` returns it for the same cases, `start`
-    of the steady state [tau], `seed` of the bootstrap and of the reference, `snapshots`, the most
-    frames used of each, `reference_particles` of a cloud of random spheres.
+    Parameters: `cells` as `cell_volumes` returns them, `steady` as `steady_state` returns it for
+    the same cases, `spheres` as `random_sphere_table` for their volume fractions, `start` of the
+    steady state [tau], `seed` of the bootstrap.
 
     Returns the columns source, model, n, volume_fraction, galileo, variance, low, high (all over
     k theta^2 = 0.2 of the paper's gamma law), inverse_beta, inverse_beta_low, inverse_beta_high.
     Sources: "steady state"; "random spheres" without overlap at the same phi, at the velocity of
     that phi's case with most particles; "random points", at each phi as well; and "paper".
 
-    Raises ValueError where there is no trajectory or `steady` lacks its case.
+    Raises ValueError where there are no cells, or `steady` or `spheres` lacks their case.
     """
     shape, scale = PAPER_GAMMA
     unit = shape * scale**2
     rows = []
-    for key, runs in sorted(_cases(trajectories).items()):
+    for key, runs in sorted(_cases(cells).items()):
         case = dict(zip(CASE, key, strict=True))
         same = (steady[list(case)] == pd.Series(case)).all(axis=1)
         if not same.any():
             raise ValueError(f"the table of steady states has no row for {case}")
         row = steady[same].iloc[0]
-        found = volume_variance(pooled_volumes(runs, start, snapshots, progress), seed)
+        found = volume_variance(pooled_volumes(runs, start), seed)
         rows.append(
             {"source": "steady state"}
             | case
@@ -289,9 +298,11 @@ def voronoi_variance_table(
     steady_rows = pd.DataFrame(rows).sort_values(["galileo", "n"], ascending=[False, True])
     for phi, largest in steady_rows.groupby("volume_fraction").last().iterrows():
         head = {"volume_fraction": phi, "inverse_beta": largest["inverse_beta"]}
-        found = random_sphere_variance(phi, reference_particles, seed)
-        spheres = {"source": "random spheres", "n": reference_particles}
-        rows.append(head | spheres | _over(unit, found))
+        found = spheres[np.isclose(spheres["volume_fraction"], phi, rtol=1e-12)]
+        if found.empty:
+            raise ValueError(f"the table of random spheres has no row for phi = {phi:g}")
+        source = {"source": "random spheres", "n": found.iloc[0]["n"]}
+        rows.append(head | source | _over(unit, found.iloc[0]))
         points = {"source": "random points", "variance": POISSON_VORONOI_VARIANCE / unit}
         rows.append(head | points)
     table = pd.concat([pd.DataFrame(rows), PAPER_VORONOI_VARIANCE.assign(source="paper")])

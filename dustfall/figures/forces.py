@@ -323,27 +323,20 @@ def accuracy_vs_cost(frame: pd.DataFrame) -> Figure:
     """
     require(frame, ["model", "component", "r2", "microseconds"], "accuracy_vs_cost")
     require_components(frame, ["streamwise", "lateral"], "accuracy_vs_cost")
-    figure = new_figure(DOUBLE, 2.8)
+    figure = new_figure(DOUBLE, 3.2)
     axes = figure.subplots(1, 2)
     for ax, component in zip(axes, ("streamwise", "lateral"), strict=True):
-        rows = frame[frame["component"] == component]
-        unexplained = 1 - rows["r2"]
-        ax.plot(rows["microseconds"], unexplained, "o", color=COMPONENT_COLOURS[component])
-        for place in zip(rows["microseconds"], unexplained, rows["model"], strict=True):
-            ax.annotate(
-                place[2].replace("_", " "),
-                place[:2],
-                (0, 5),
-                textcoords="offset points",
-                ha="center",
-                fontsize=7,
-            )
+        models = frame[frame["component"] == component].groupby("model", sort=False)
+        for (model, rows), marker in zip(models, cycle("osD^v<>Ph*"), strict=False):
+            name = model.replace("_", " ")
+            ax.plot(rows["microseconds"], 1 - rows["r2"], marker, ls="none", label=name)
         ax.set_xscale("log")
         ax.set_yscale("log")
-        ax.margins(0.15)
+        ax.margins(0.1)
         ax.set_xlabel(r"processor time [$\mu$s a particle]")
         ax.set_ylabel(f"$1 - R^2$, {component}")
     letter(axes)
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=5)
     return figure
 
 

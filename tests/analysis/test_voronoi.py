@@ -12,10 +12,11 @@ from dustfall.analysis.references import MATCHED_GAMMA, PAPER_GAMMA, POISSON_VOR
 from dustfall.analysis.settling import CASE
 from dustfall.analysis.voronoi import (
     block_bootstrap,
+    cell_volumes,
     gamma_pdf,
     pooled_volumes,
+    random_sphere_table,
     random_sphere_variance,
-    snapshot_volumes,
     volume_distribution,
     volume_variance,
     voronoi_pdf_table,
@@ -117,18 +118,25 @@ def test_block_bootstrap_has_the_textbook_width_and_none_of_one_block():
     assert np.isnan(block_bootstrap(x[:3], seed=1, length=2.0)).all()
 
 
-def test_snapshots_are_chosen_in_time_and_volumes_normalised():
+def cells(start=0.0, **changes):
+    return cell_volumes(trajectory(**changes), start)
+
+
+def test_first_frame_and_snapshots_in_time_are_measured_and_volumes_normalised():
     seen = []
-    volumes = snapshot_volumes(trajectory(), 40.0, snapshots=2, progress=lambda *a: seen.append(a))
-    assert volumes.shape == (2, 60)
-    np.testing.assert_allclose(volumes.mean(axis=1), 1)
-    assert seen == [(1, 2), (2, 2)]
-    with pytest.raises(ValueError, match="no frame lies between 300"):
-        snapshot_volumes(trajectory(), 300.0)
+    run = trajectory()
+    found = cell_volumes(run, 40.0, snapshots=2, progress=lambda *a: seen.append(a))
+    assert found["volume"].shape == (3, 60)
+    assert found["time"].values.tolist() == [0.0, 40.0, 100.0]
+    np.testing.assert_allclose(found["volume"].mean("atom"), 1)
+    assert seen == [(1, 3), (2, 3), (3, 3)]
+    assert found.attrs == run.attrs
+    with pytest.raises(ValueError, match="no frame lies at or after 300"):
+        cell_volumes(run, 300.0)
 
 
 def test_pdf_table_names_galileo_numbers_as_multiples_of_the_lowest():
-    table = voronoi_pdf_table([trajectory(0.312), trajectory(0.078)], 50.0, seed=1)
+    table = voronoi_pdf_table([cells(galileo=0.312), cells(galileo=0.078)], 50.0, seed=1)
     assert table["source"].unique().tolist() == [
         "random start",
         "steady state",
@@ -141,27 +149,30 @@ def test_pdf_table_names_galileo_numbers_as_multiples_of_the_lowest():
 def test_variance_table_stands_beside_the_settling_velocity_of_the_same_case():
     case = dict(zip(CASE, ("idnn", 60, 1e-3, 0.078), strict=True))
     steady = pd.DataFrame([case | {"value": 1.4, "low": 1.3, "high": 1.5}])
-    table = voronoi_variance_table([trajectory()], steady, 50.0, 1, reference_particles=100)
+    spheres = random_sphere_table([1e-3], seed=1, particles=100)
+    table = voronoi_variance_table([cells()], steady, spheres, 50.0, seed=1)
     assert set(table["source"]) == {"steady state", "random spheres", "random points", "paper"}
     ours = table[table["source"] != "paper"].set_index("source")
     assert (ours["inverse_beta"] == 1.4).all()
     assert ours.loc["random points", "variance"] == pytest.approx(0.89516)
-    found = snapshot_volumes(trajectory(), 50.0).var(axis=1).mean()
+    found = pooled_volumes([cells()], 50.0).var(axis=1).mean()
     assert ours.loc["steady state", "variance"] == pytest.approx(found / 0.2)
-    spheres = random_sphere_variance(1e-3, 100, seed=1)
-    assert ours.loc["random spheres", "high"] == pytest.approx(spheres["high"] / 0.2)
-    with pytest.raises(ValueError, match="no row for"):
-        voronoi_variance_table([trajectory(galileo=0.3)], steady, 50.0, seed=1)
+    expected = random_sphere_variance(1e-3, 100, seed=1)
+    assert ours.loc["random spheres", "high"] == pytest.approx(expected["high"] / 0.2)
+    with pytest.raises(ValueError, match="steady states has no row for"):
+        voronoi_variance_table([cells(galileo=0.3)], steady, spheres, 50.0, seed=1)
+    with pytest.raises(ValueError, match="random spheres has no row for phi"):
+        voronoi_variance_table([cells()], steady, spheres[:0], 50.0, seed=1)
 
 
 def test_seeds_of_a_case_are_pooled_and_narrow_the_interval():
-    one = pooled_volumes([trajectory(seed=1)], 0.0)
-    two = pooled_volumes([trajectory(seed=1), trajectory(seed=2)], 0.0)
+    one = pooled_volumes([cells(seed=1)], 0.0)
+    two = pooled_volumes([cells(seed=1), cells(seed=2)], 0.0)
     assert two.shape == (6, 120)
     np.testing.assert_array_equal(two[:, :60], one)
     width = [v["high"] - v["low"] for v in (volume_variance(one, 1), volume_variance(two, 1))]
     assert width[1] < width[0]
-    pdf = voronoi_pdf_table([trajectory(seed=1), trajectory(seed=2)], 50.0, seed=1)
+    pdf = voronoi_pdf_table([cells(seed=1), cells(seed=2)], 50.0, seed=1)
     assert pdf["galileo_multiple"].dropna().unique().tolist() == [1.0]
 
 
@@ -190,6 +201,6 @@ def test_bad_points_are_refused(points, lengths, match):
         voronoi_volumes(points, lengths)
 
 
-def test_no_trajectories_are_refused():
+def test_no_cells_are_refused():
     with pytest.raises(ValueError, match="at least one"):
         voronoi_pdf_table([], 50.0, seed=1)

@@ -21,6 +21,7 @@ STEADY_TABLE = {
 }
 SPECTRA = {"figure_phase_and_spectra": 1, "figure_cloud_spectra": 1}
 STEADY = {
+    "voronoi_cells": 7,
     "neighbour_changes": 1,
     "figure_ergodicity": 1,
     "figure_voronoi_pdf": 1,
@@ -102,7 +103,13 @@ def test_bits_of_the_data_hang_neither_on_cores_nor_on_shard_size(campaign, tmp_
         ("sedimentation={step: 0.05}", ALL_SETTLING),
         (
             "sedimentation={galileo: {multiples: [1, 2, 3]}}",
-            {"sedimentation": 1, "neighbour_changes": 1} | STEADY_TABLE | {"figure_voronoi_pdf": 1},
+            {
+                "sedimentation": 1,
+                "voronoi_cells": 1,
+                "neighbour_changes": 1,
+                "figure_voronoi_pdf": 1,
+            }
+            | STEADY_TABLE,
         ),
         ("sedimentation={statistics_from: 5}", STEADY),
         (

@@ -55,6 +55,8 @@ def test_the_paper_takes_the_expected_jobs_and_fewer_than_a_thousand(project):
         "neighbour_changes": 1,
         "mesh_study": 1,
         "movie": 1,
+        "voronoi_cells": (3 + 1 + 1) * 6 + 2,
+        "random_spheres": 1,
         **{f"figure_{name}": 1 for name in FIGURES},
     }
     assert jobs == expected

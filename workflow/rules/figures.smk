@@ -267,10 +267,45 @@ rule movie:
         "../scripts/movie.py"
 
 
+rule voronoi_cells:
+    """Volumes of the Voronoi cells in some frames of a case."""
+    input:
+        trajectory="results/sedimentation/{case}.nc",
+        library=library("voronoi_cells.py"),
+    output:
+        "results/analysis/voronoi/{case}.nc",
+    log:
+        "logs/analysis/voronoi/{case}.log",
+    benchmark:
+        "benchmarks/analysis/voronoi/{case}.tsv"
+    params:
+        statistics_from=config["sedimentation"]["statistics_from"],
+        snapshots=config["figures"]["snapshots"],
+    script:
+        "../scripts/voronoi_cells.py"
+
+
+rule random_spheres:
+    """Voronoi volumes of random spheres, to compare the settling ones with."""
+    input:
+        library=library("random_spheres.py"),
+    output:
+        "results/analysis/random_spheres.csv",
+    log:
+        "logs/analysis/random_spheres.log",
+    benchmark:
+        "benchmarks/analysis/random_spheres.tsv"
+    params:
+        seed=config["seed"],
+        volume_fractions=config["sedimentation"]["volume_fractions"],
+    script:
+        "../scripts/random_spheres.py"
+
+
 rule figure_voronoi_pdf:
     """P.d.f. of Voronoi volumes at each Galileo number."""
     input:
-        trajectories=expand("results/sedimentation/{case}.nc", case=GALILEO_CASES),
+        cells=expand("results/analysis/voronoi/{case}.nc", case=GALILEO_CASES),
         library=library("figure_voronoi_pdf.py"),
     output:
         **figure("voronoi_pdf", "Sedimentation"),
@@ -281,7 +316,6 @@ rule figure_voronoi_pdf:
     params:
         seed=config["seed"],
         statistics_from=config["sedimentation"]["statistics_from"],
-        snapshots=config["figures"]["snapshots"],
     script:
         "../scripts/figure_voronoi_pdf.py"
 
@@ -290,7 +324,8 @@ rule figure_voronoi_variance:
     """Variance of Voronoi volumes against settling velocity."""
     input:
         steady="results/analysis/steady_state.csv",
-        trajectories=expand("results/sedimentation/{case}.nc", case=PLAIN_CASES),
+        spheres="results/analysis/random_spheres.csv",
+        cells=expand("results/analysis/voronoi/{case}.nc", case=PLAIN_CASES),
         library=library("figure_voronoi_variance.py"),
     output:
         **figure("voronoi_variance", "Sedimentation"),
@@ -301,7 +336,6 @@ rule figure_voronoi_variance:
     params:
         seed=config["seed"],
         statistics_from=config["sedimentation"]["statistics_from"],
-        snapshots=config["figures"]["snapshots"],
     script:
         "../scripts/figure_voronoi_variance.py"
 

@@ -12,6 +12,6 @@ from dustfall.figures.voronoi import voronoi_pdf
 joblog.start(snakemake.log[0])
 
 params = snakemake.params
-trajectories = [xr.open_dataset(path) for path in snakemake.input.trajectories]
-table = voronoi_pdf_table(trajectories, params.statistics_from, params.seed, params.snapshots)
+cells = [xr.open_dataset(path) for path in snakemake.input.cells]
+table = voronoi_pdf_table(cells, params.statistics_from, params.seed)
 save(voronoi_pdf(table), table, Path(snakemake.output.png).with_suffix(""))

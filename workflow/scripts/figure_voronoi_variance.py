@@ -15,8 +15,7 @@ joblog.start(snakemake.log[0])
 params = snakemake.params
 steady = pd.read_csv(snakemake.input.steady, float_precision="round_trip")
 steady = steady[steady["quantity"] == "settling_velocity_mean"]
-trajectories = [xr.open_dataset(path) for path in snakemake.input.trajectories]
-table = voronoi_variance_table(
-    trajectories, steady, params.statistics_from, params.seed, params.snapshots
-)
+spheres = pd.read_csv(snakemake.input.spheres, float_precision="round_trip")
+cells = [xr.open_dataset(path) for path in snakemake.input.cells]
+table = voronoi_variance_table(cells, steady, spheres, params.statistics_from, params.seed)
 save(voronoi_variance(table), table, Path(snakemake.output.png).with_suffix(""))
