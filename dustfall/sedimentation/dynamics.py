@@ -26,7 +26,7 @@ SERIES_BELOW = 0.05
 """Where `beta * step` is smaller, the differences of exponentials come from their series."""
 
 
-def drag_coefficients(model, velocity: np.ndarray, neighbours: np.ndarray, first: int = 0):
+def drag_coefficients(model, velocity: np.ndarray, neighbours: np.ndarray, rows=None):
     """Ask a force model for the drag on every particle.
 
     A particle at rest has no direction of flow and no drag; its beta is that of the flow it meets
@@ -37,7 +37,7 @@ def drag_coefficients(model, velocity: np.ndarray, neighbours: np.ndarray, first
     model : has `predict(neighbours)`, (n, 5, 3) in d_p to (n, 3) in Re_p c_D, flow along +y
     velocity : (n, 3) in v_s, box frame
     neighbours : (n, 5, 3) from each particle to its neighbours in d_p, box frame
-    first : number of the first of these particles among all, for the message of an error
+    rows : (n,) numbers of these particles, for the message of an error; by default 0 to n - 1
 
     Returns
     -------
@@ -54,10 +54,11 @@ def drag_coefficients(model, velocity: np.ndarray, neighbours: np.ndarray, first
     rotation = rotation_to_streamwise(flow)
     force = np.ascontiguousarray(model.predict(_rotate(rotation, neighbours)), dtype=np.float64)
     if not np.isfinite(force).all():
-        row = np.flatnonzero(~np.isfinite(force).all(axis=1))[0]
+        k = np.flatnonzero(~np.isfinite(force).all(axis=1))[0]
+        particle = k if rows is None else rows[k]
         raise FloatingPointError(
-            f"the force model returned {force[row]} for particle {first + row}, which has velocity "
-            f"{velocity[row]} and neighbours at {neighbours[row].tolist()}"
+            f"the force model returned {force[k]} for particle {particle}, which has velocity "
+            f"{velocity[k]} and neighbours at {neighbours[k].tolist()}"
         )
     return force[:, 1] / STOKES_DRAG, _side_force(rotation, force, velocity)
 

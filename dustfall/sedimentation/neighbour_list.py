@@ -48,20 +48,31 @@ class NeighbourList:
     particles : at least six
     side : of the cube
     blocks : of the particles
+    order, updates : of the list that this one continues, to the bits of a model to which the order
+        of its scenes matters
 
     Attributes
     ----------
     index : (n, 5) int32, rows of the neighbours, nearest first
+    order : (n,) int32, all rows, those of particles near each other together
     searched : particles that the last update searched anew
     """
 
-    def __init__(self, particles: int, side: float, blocks: Blocks):
+    def __init__(
+        self,
+        particles: int,
+        side: float,
+        blocks: Blocks,
+        order: np.ndarray | None = None,
+        updates: int = 0,
+    ):
         self.side = float(side)
         self.index = np.empty((particles, NEIGHBOURS), np.int32)
         self.searched = 0
         self._blocks = blocks
-        self._updates = 0
-        self._wrapped = self._before = self._order = None
+        self.order = order
+        self._updates = updates
+        self._wrapped = self._before = None
         self._listed = np.empty((particles, CANDIDATES), np.int32)
         self._distance = np.empty((particles, CANDIDATES), np.float32)
         self._length = np.zeros(particles, np.int32)
@@ -80,8 +91,8 @@ class NeighbourList:
             _add_way(self._way, position, self._before, self.side)
         self._before = position.copy()
         cells = sort_by_cell(self._wrapped, self.side)
-        if self._updates % REORDERED_EVERY == 0:
-            self._order = cells[1]
+        if self._updates % REORDERED_EVERY == 0 or self.order is None:
+            self.order = cells[1]
             self._length[:] = 0
         self._updates += 1
         self.index = np.empty_like(self.index)
@@ -93,7 +104,7 @@ class NeighbourList:
                 self._wrapped,
                 self.side,
                 cells,
-                self._order,
+                self.order,
                 self._way,
                 self._way_at_search,
                 self._listed,
@@ -107,9 +118,9 @@ class NeighbourList:
         self.searched = int(searched.sum())
         return self.index
 
-    def vectors(self, first: int, last: int) -> np.ndarray:
-        """Vectors (m, 5, 3) from the particles `first` to `last - 1` to their neighbours."""
-        return separations(self._wrapped, self.index, self.side, first, last)
+    def vectors(self, rows: np.ndarray) -> np.ndarray:
+        """Vectors (m, 5, 3) from the particles `rows` (m,) to their neighbours."""
+        return separations(self._wrapped, self.index, self.side, rows)
 
 
 @njit(cache=True, nogil=True)

@@ -46,7 +46,7 @@ def nearest_neighbours(position: np.ndarray, side: float) -> tuple[np.ndarray, n
     index = np.empty((n, NEIGHBOURS), np.int32)
     with Blocks(n) as blocks:
         blocks.run(lambda first, last: _search(first, last, wrapped, side, cells, index))
-    return separations(wrapped, index, side, 0, n), index
+    return separations(wrapped, index, side, np.arange(n)), index
 
 
 def check_positions(position: np.ndarray, side: float) -> np.ndarray:
@@ -99,15 +99,16 @@ def distance2(wrapped, i, j, side):
 
 
 @njit(cache=True, nogil=True)
-def separations(wrapped, index, side, first, last):
-    """Vectors (m, 5, 3) from the particles `first` to `last - 1` to their neighbours."""
-    vectors = np.empty((last - first, index.shape[1], 3))
-    for i in range(first, last):
+def separations(wrapped, index, side, rows):
+    """Vectors (m, 5, 3) from the particles `rows` (m,) to their neighbours."""
+    vectors = np.empty((len(rows), index.shape[1], 3))
+    for k in range(len(rows)):
+        i = rows[k]
         for slot in range(index.shape[1]):
             j = index[i, slot]
             for axis in range(3):
                 difference = wrapped[j, axis] - wrapped[i, axis]
-                vectors[i - first, slot, axis] = _nearest_image(difference, side)
+                vectors[k, slot, axis] = _nearest_image(difference, side)
     return vectors
 
 

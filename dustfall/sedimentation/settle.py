@@ -159,12 +159,12 @@ def settle(
         if state:
             done, position, velocity = int(state["done"]), state["position"], state["velocity"]
             beta_before, side_force_before = state["beta"], state["side_force"]
-            index_before = state["index"]
+            index_before, order = state["index"], state.get("order")
         else:
-            done, position, velocity = 0, positions, velocities
+            done, position, velocity, order = 0, positions, velocities, None
         first, began = done, time.monotonic()
         saved = began
-        neighbours = NeighbourList(particles, side, blocks)
+        neighbours = NeighbourList(particles, side, blocks, order, updates=done)
         while True:
             index = neighbours.update(position)
             beta, side_force = _drag(model, velocity, neighbours, blocks)
@@ -213,6 +213,7 @@ def settle(
                     "beta": beta_before,
                     "side_force": side_force_before,
                     "index": index_before,
+                    "order": neighbours.order,
                     "frames": frames.count,
                     "rows": rows.count,
                 }
@@ -239,13 +240,13 @@ def settle(
 
 
 def _drag(model, velocity: np.ndarray, neighbours: NeighbourList, blocks: Blocks):
-    """Drag coefficient (n,) and side force (n, 3) of all particles, block by block."""
+    """Drag coefficient (n,) and side force (n, 3) of all particles, block by block in space."""
     beta, side_force = np.empty(len(velocity)), np.empty_like(velocity)
 
     def work(first, last):
-        rows = slice(first, last)
+        rows = neighbours.order[first:last]
         beta[rows], side_force[rows] = drag_coefficients(
-            model, velocity[rows], neighbours.vectors(first, last), first
+            model, velocity[rows], neighbours.vectors(rows), rows
         )
 
     blocks.run(work)

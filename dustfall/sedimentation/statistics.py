@@ -30,7 +30,9 @@ def step_statistics(
     """
     falling = -velocity[:, 2]
     fresh, fifth_alone = changed_neighbours(neighbours.index, index_before)
-    overlaps, below_contact = contacts(neighbours.vectors(0, len(velocity)), neighbours.index)
+    overlaps, below_contact = contacts(
+        neighbours.vectors(neighbours.order), neighbours.order, neighbours.index
+    )
     return {
         "settling_velocity_mean": falling.mean(),
         "settling_velocity_variance": falling.var(),
@@ -75,16 +77,20 @@ def _is_among(j, index, i):
 
 
 @njit(cache=True, nogil=True)
-def contacts(vectors, index):
+def contacts(vectors, rows, index):
     """Count what is closer than a diameter, centre to centre.
+
+    `vectors` (n, 5, 3) from the particles `rows` (n,), all of them in any order, to their
+    neighbours; `index` (n, 5) as of `NeighbourList`.
 
     Returns the pairs of particles of which one is among the other's five nearest, and the
     neighbours that the force model sees below contact (of one pair: one or two).
     """
     pairs = seen = 0
-    for i in range(len(index)):
+    for k in range(len(rows)):
+        i = rows[k]
         for slot in range(NEIGHBOURS):
-            x, y, z = vectors[i, slot, 0], vectors[i, slot, 1], vectors[i, slot, 2]
+            x, y, z = vectors[k, slot, 0], vectors[k, slot, 1], vectors[k, slot, 2]
             if x * x + y * y + z * z < 1.0:
                 seen += 1
                 j = index[i, slot]

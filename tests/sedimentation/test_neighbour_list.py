@@ -46,7 +46,7 @@ def test_moving_particles_have_the_neighbours_of_a_plain_search_to_the_last_bit(
     for _ in range(12):
         vectors, index = nearest_neighbours(position, side)
         np.testing.assert_array_equal(neighbours.update(position), index)
-        np.testing.assert_array_equal(neighbours.vectors(0, n), vectors)
+        np.testing.assert_array_equal(neighbours.vectors(np.arange(n)), vectors)
         position = position + velocity + 0.02 * rng.normal(size=(n, 3)) * velocity.any()
 
 

@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from dustfall.forces.rotne_prager import IsolatedStokes, RotnePrager
 from dustfall.sedimentation import Properties, cube_side, random_positions, settle
+from dustfall.sedimentation.neighbour_list import REORDERED_EVERY
 
 DUST = Properties()
 
@@ -375,6 +376,29 @@ def interrupt_at(step):
             raise Interruption
 
     return interrupt
+
+
+class MindfulOfOrder:
+    """A model whose forces hang on the place of a scene among those that it is shown."""
+
+    def predict(self, neighbours):
+        force = RotnePrager().predict(neighbours)
+        force[:, 1] *= 1 + 1e-6 * np.arange(len(force))
+        return force
+
+
+def test_interrupted_run_goes_on_to_the_same_bits_with_a_model_that_minds_the_order(tmp_path):
+    whole, parts = tmp_path / "whole", tmp_path / "parts"
+    settings = {"model": MindfulOfOrder(), "duration": 0.1 * (REORDERED_EVERY + 9)}
+    run(whole, **settings, save_interval=0.1)
+    for step in (7, REORDERED_EVERY, REORDERED_EVERY + 4):
+        with pytest.raises(Interruption):
+            run(
+                parts, **settings, save_interval=0.1, checkpoint=parts / "checkpoint",
+                checkpoint_interval=0.0, progress=interrupt_at(step),
+            )  # fmt: skip
+    run(parts, **settings, save_interval=0.1, checkpoint=parts / "checkpoint")
+    assert_same_files(parts, whole)
 
 
 # Half of the records is less than either state stands on: such a run begins anew.

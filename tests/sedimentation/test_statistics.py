@@ -29,5 +29,7 @@ def test_pairs_below_contact_count_once_and_neighbours_as_often_as_they_are_seen
     vectors[2, 3] = [0, 0.9, 0]  # 4 is not shown 2
     index = np.vstack([index, [[9, 8, 7, 6, 5]] * 2]).astype(np.int32)
     vectors = np.vstack([vectors, np.full((2, 5, 3), 2.0)])
-    assert contacts(vectors, index) == (2, 3)
-    assert contacts(2.1 * vectors, index) == (0, 0)
+    rows = np.arange(len(index))
+    assert contacts(vectors, rows, index) == (2, 3)
+    assert contacts(vectors[::-1].copy(), rows[::-1].copy(), index) == (2, 3)
+    assert contacts(2.1 * vectors, rows, index) == (0, 0)
