@@ -56,6 +56,16 @@ def block_widths(kind: str, layers: str, component: str) -> list[list[int]]:
     ]
 
 
+def multiplications(kind: str, layers: str, component: str) -> int:
+    """Return how often a prediction of one component multiplies by a weight: its cost."""
+    widths = block_widths(kind, layers, component)
+    return sum(
+        wide * narrow
+        for block in USES[KINDS[kind].blocks][:, 0]
+        for wide, narrow in pairwise(widths[block])
+    )
+
+
 @dataclass(frozen=True)
 class Network:
     """Trained weights of one component's network.

@@ -10,7 +10,7 @@ from safetensors.numpy import save_file
 
 from dustfall.forces import RotnePrager, load_model
 from dustfall.forces.features import COMPONENTS, describe
-from dustfall.forces.models import VERSION, parse_layers
+from dustfall.forces.models import VERSION, multiplications, parse_layers
 from dustfall.forces.networks import build
 from tests.forces.scenes import LAYERS, random_neighbours
 
@@ -214,6 +214,13 @@ def test_neighbours_of_another_shape_or_not_finite_are_refused(models, kind):
 def test_layers_that_do_not_fit_the_kind_are_refused(layers, kind):
     with pytest.raises(ValueError, match="layers is"):
         parse_layers(layers, kind)
+
+
+def test_multiplications_count_every_use_of_a_block():
+    # Two nearest neighbours: 6-40-40-1; each of the other three: 3-30-30-30-1.
+    expected = (6 * 40 + 40 * 40 + 40) + 3 * (3 * 30 + 2 * 30 * 30 + 30)
+    assert multiplications("idnn", "40-40/30-30-30", "streamwise") == expected
+    assert multiplications("dense", "8", "lateral") == 15 * 8 + 8 * 2
 
 
 def test_both_components_are_in_a_model(models):

@@ -8,13 +8,18 @@ import pandas as pd
 import joblog
 from dustfall.files import atomic
 from dustfall.forces.cross_validation import choose_winner
+from dustfall.forces.models import multiplications
 
 joblog.start(snakemake.log[0])
 
 results = [json.loads(Path(path).read_text()) for path in snakemake.input.results]
 winner = choose_winner(results)
 folds = pd.concat(pd.DataFrame(result.pop("folds")).assign(**result) for result in results)
-table = folds.groupby(["component", "layers", "parameters"]).agg(
+folds["multiplications"] = [
+    multiplications(*trial)
+    for trial in zip(folds["kind"], folds["layers"], folds["component"], strict=True)
+]
+table = folds.groupby(["component", "layers", "parameters", "multiplications"]).agg(
     mse_mean=("mse", "mean"),
     mse_deviation=("mse", "std"),
     r2_mean=("r2", "mean"),
