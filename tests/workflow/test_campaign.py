@@ -20,11 +20,11 @@ STEADY_TABLE = {
     "figure_voronoi_variance": 1,
 }
 SPECTRA = {"figure_phase_and_spectra": 1, "figure_cloud_spectra": 1}
+CELLS = {"voronoi_cells": 7, "figure_voronoi_pdf": 1}
 STEADY = {
-    "voronoi_cells": 7,
     "neighbour_changes": 1,
     "figure_ergodicity": 1,
-    "figure_voronoi_pdf": 1,
+    **CELLS,
     **SPECTRA,
     **STEADY_TABLE,
 }
@@ -136,7 +136,7 @@ def test_an_edited_key_reruns_what_hangs_on_it_and_nothing_else(campaign, settin
         ("dataset.py", FROM_DATA),
         ("forces/training.py", MODELS | SETTLING),
         ("sedimentation/dynamics.py", ALL_SETTLING),
-        ("analysis/voronoi.py", {"figure_voronoi_pdf": 1, "figure_voronoi_variance": 1}),
+        ("analysis/voronoi.py", {"random_spheres": 1, **CELLS, "figure_voronoi_variance": 1}),
         ("figures/mesh.py", {"figure_mesh_study": 1}),
         ("progress.py", {}),
     ],
