@@ -298,7 +298,7 @@ def voronoi_variance_table(
     steady_rows = pd.DataFrame(rows).sort_values(["galileo", "n"], ascending=[False, True])
     for phi, largest in steady_rows.groupby("volume_fraction").last().iterrows():
         head = {"volume_fraction": phi, "inverse_beta": largest["inverse_beta"]}
-        found = spheres[np.isclose(spheres["volume_fraction"], phi, rtol=1e-12)]
+        found = spheres[spheres["volume_fraction"] == phi]
         if found.empty:
             raise ValueError(f"the table of random spheres has no row for phi = {phi:g}")
         source = {"source": "random spheres", "n": found.iloc[0]["n"]}

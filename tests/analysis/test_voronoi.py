@@ -163,6 +163,9 @@ def test_variance_table_stands_beside_the_settling_velocity_of_the_same_case():
         voronoi_variance_table([cells(galileo=0.3)], steady, spheres, 50.0, seed=1)
     with pytest.raises(ValueError, match="random spheres has no row for phi"):
         voronoi_variance_table([cells()], steady, spheres[:0], 50.0, seed=1)
+    close = spheres.assign(volume_fraction=1e-3 + 1e-9)
+    with pytest.raises(ValueError, match="random spheres has no row for phi"):
+        voronoi_variance_table([cells()], steady, close, 50.0, seed=1)
 
 
 def test_seeds_of_a_case_are_pooled_and_narrow_the_interval():
