@@ -57,19 +57,22 @@ class BlockSum(nn.Module):
     def __init__(self, blocks: list[Block], uses):
         super().__init__()
         self.blocks = nn.ModuleList(blocks)
-        self.rows = [(uses[:, 0] == number).nonzero()[0].tolist() for number in range(len(blocks))]
-        self.uses = uses.tolist()
+        # The uses of a block follow each other, so that what they see is one piece.
+        self.pieces = []
+        for number in range(len(blocks)):
+            rows = np.flatnonzero(uses[:, 0] == number)
+            first, end = uses[rows[0], 1], uses[rows[-1], 1:].sum()
+            self.pieces.append((slice(rows[0], rows[-1] + 1), slice(first, end)))
 
     def forward(self, inputs: torch.Tensor, envelope: torch.Tensor) -> torch.Tensor:
         """Map normalised inputs (k, b, 5, F) and envelope (k, b, uses) to (k, b, 1 or 2)."""
         k, b = inputs.shape[:2]
         total = 0.0
-        for rows, block in zip(self.rows, self.blocks, strict=True):
-            # The uses of a block follow each other, so that what they see is one piece.
-            first, end = self.uses[rows[0]][1], sum(self.uses[rows[-1]][1:])
-            seen = inputs[:, :, first:end].reshape(k, b * len(rows), -1)
-            outputs = block(seen).view(k, b, len(rows), -1)
-            total = total + (outputs * envelope[:, :, rows[0] : rows[-1] + 1, None]).sum(2)
+        for (rows, neighbours), block in zip(self.pieces, self.blocks, strict=True):
+            weights = envelope[:, :, rows, None]
+            uses = weights.shape[2]
+            seen = inputs[:, :, neighbours].reshape(k, b * uses, -1)
+            total = total + (block(seen).view(k, b, uses, -1) * weights).sum(2)
         return total
 
 
