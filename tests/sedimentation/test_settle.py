@@ -332,6 +332,15 @@ class Interruption(BaseException):
     """Stands for a crash at a chosen place; nothing in the library catches it."""
 
 
+def crash_and_go_on(folder, monkeypatch, owner, function, crash):
+    """Run into a function of `owner` that crashes, then once more with it whole."""
+    with monkeypatch.context() as patch:
+        patch.setattr(owner, function, crash)
+        with pytest.raises(Interruption):
+            run(folder, checkpoint=folder / "checkpoint", checkpoint_interval=0.0)
+    run(folder, checkpoint=folder / "checkpoint")
+
+
 @pytest.mark.parametrize("replacement", range(1, 6))
 def test_run_that_crashes_amid_a_checkpoint_goes_on_to_the_same_bits(
     tmp_path, undisturbed, monkeypatch, replacement
@@ -345,11 +354,7 @@ def test_run_that_crashes_amid_a_checkpoint_goes_on_to_the_same_bits(
             raise Interruption
         replace(source, target)
 
-    with monkeypatch.context() as patch:
-        patch.setattr(os, "replace", crash)
-        with pytest.raises(Interruption):
-            run(tmp_path, checkpoint=tmp_path / "checkpoint", checkpoint_interval=0.0)
-    run(tmp_path, checkpoint=tmp_path / "checkpoint")
+    crash_and_go_on(tmp_path, monkeypatch, os, "replace", crash)
     assert_same_files(tmp_path, undisturbed)
 
 
@@ -362,11 +367,7 @@ def test_run_that_crashes_amid_its_clearing_up_goes_on_to_the_same_bits(
         if path.name == last:
             raise Interruption
 
-    with monkeypatch.context() as patch:
-        patch.setattr(Path, "unlink", crash)
-        with pytest.raises(Interruption):
-            run(tmp_path, checkpoint=tmp_path / "checkpoint", checkpoint_interval=0.0)
-    run(tmp_path, checkpoint=tmp_path / "checkpoint")
+    crash_and_go_on(tmp_path, monkeypatch, Path, "unlink", crash)
     assert_same_files(tmp_path, undisturbed)
 
 
