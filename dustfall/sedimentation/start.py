@@ -46,7 +46,7 @@ def random_positions(rng: np.random.Generator, particles: int, volume_fraction: 
     Returns
     -------
     (n, 3) positions in d_p, within the cube of side `cube_side(particles, volume_fraction)`, cell
-    by cell: what is near in space is near in memory, which a step of a large run needs
+    by cell
 
     Raises
     ------
