@@ -16,7 +16,7 @@ from dustfall.files import atomic
 from dustfall.scenes import LAWS
 
 NOT_CONVERGED = 1
-"""Status of a scene that is left out (`stokes.many_body`, whose import would load its kernels)."""
+"""Status of a scene that is left out (`stokes.solve`, whose import would load its kernels)."""
 
 TEST_SCENES = 1000
 """Item of the random stream that draws the test scenes."""

@@ -1,5 +1,5 @@
 """Forces on fixed spheres in Stokes flow, by boundary elements."""
 
-from dustfall.stokes.many_body import forces_on_fixed_spheres
+from dustfall.stokes.solve import forces_on_fixed_spheres
 
 __all__ = ["forces_on_fixed_spheres"]

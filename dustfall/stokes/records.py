@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 
 from dustfall.files import atomic
-from dustfall.stokes.many_body import Plan, Response, plan_scene, solve
+from dustfall.stokes.solve import Plan, Response, plan_scene, solve
 
 RECORD_UNITS = {
     "force": "Re_p c_D",

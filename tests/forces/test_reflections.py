@@ -3,9 +3,9 @@ import pytest
 
 from dustfall.forces import Reflections, RotnePrager, rotne_prager_forces
 from dustfall.forces.reflections import REFLECTIONS
-from dustfall.forces.six_spheres import TERMS, six_sphere_forces
 from dustfall.scenes import random_scenes
-from dustfall.stokes.exact import pair_drag
+from dustfall.stokes.references.exact_pairs import pair_drag
+from dustfall.suspension.six_spheres import TERMS, six_sphere_forces
 from tests.forces.scenes import random_neighbours
 
 RADIUS = 0.5

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from dustfall.forces.models import load_model
+from dustfall.forces.learned import load_model
 from dustfall.sedimentation import Properties, settle
 from dustfall.sedimentation.blocks import BLOCK, Blocks
 

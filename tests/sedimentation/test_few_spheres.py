@@ -14,7 +14,7 @@ from dustfall.forces.rotne_prager import rotne_prager_forces
 from dustfall.sedimentation import Properties
 from dustfall.sedimentation.dynamics import advance, drag_coefficients
 from dustfall.stokes import forces_on_fixed_spheres
-from dustfall.stokes.exact import forces_on_two_spheres, pair_drag
+from dustfall.stokes.references.exact_pairs import forces_on_two_spheres, pair_drag
 
 STOKES_NUMBER = Properties().stokes_number
 

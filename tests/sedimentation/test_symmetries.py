@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from dustfall.forces.models import load_model
+from dustfall.forces.learned import load_model
 from dustfall.forces.rotne_prager import RotnePrager
 from dustfall.sedimentation import Properties, cube_side, random_positions, settle
 

@@ -3,9 +3,8 @@
 import numpy as np
 
 from dustfall.scenes import random_scenes
-from dustfall.stokes.many_body import one_body_response
-from dustfall.stokes.mesh import sphere_mesh
-from dustfall.stokes.one_body import OneBody
+from dustfall.stokes.elements.mesh import sphere_mesh
+from dustfall.stokes.elements.one_body import OneBody
 from dustfall.stokes.records import (
     RECORD_UNITS,
     plan_shard,
@@ -14,6 +13,7 @@ from dustfall.stokes.records import (
     write_plans,
     write_records,
 )
+from dustfall.stokes.solve import one_body_response
 
 
 def test_plans_come_back_from_their_file(tmp_path):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import lebedev_rule
 
-from dustfall.stokes.compressed import _add_pair
 from dustfall.stokes.harmonics import real_harmonics
+from dustfall.stokes.multipoles import _add_pair
 from dustfall.stokes.translation import (
     axial_coupling,
     block_sizes,

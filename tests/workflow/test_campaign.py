@@ -134,7 +134,7 @@ def test_an_edited_key_reruns_what_hangs_on_it_and_nothing_else(campaign, settin
         ("scenes.py", SHARDS | FROM_DATA),
         ("stokes/records.py", {"meshes": 5, "stokes": 5} | FROM_DATA),
         ("dataset.py", FROM_DATA),
-        ("forces/training.py", MODELS | SETTLING),
+        ("training/fit.py", MODELS | SETTLING),
         ("sedimentation/dynamics.py", ALL_SETTLING),
         ("analysis/voronoi.py", {"random_spheres": 1, **CELLS, "figure_voronoi_variance": 1}),
         ("figures/mesh.py", {"figure_mesh_study": 1}),

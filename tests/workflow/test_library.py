@@ -17,8 +17,8 @@ def test_imports_through_other_modules_count(tmp_path):
     files = files_of(tmp_path, "from dustfall.sedimentation.settle import settle")
     assert "dustfall/sedimentation/settle.py" in files
     assert "dustfall/sedimentation/neighbours.py" in files
-    assert "dustfall/forces/training.py" not in files
-    assert "dustfall/stokes/single_layer.py" not in files
+    assert "dustfall/training/fit.py" not in files
+    assert "dustfall/stokes/elements/single_layer.py" not in files
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from dustfall.analysis.evaluation import scores, symmetry_violations
 from dustfall.dataset import read, split
 from dustfall.files import atomic
 from dustfall.forces.formulas import FORMULAS
-from dustfall.forces.models import load_model
+from dustfall.forces.learned import load_model
 
 joblog.start(snakemake.log[0])
 params = snakemake.params

@@ -1,8 +1,8 @@
 """Drag on an isolated sphere against mesh size, with observed orders and convergence index."""
 
 import joblog
+from dustfall.benchmarks.mesh_study import convergence_table, mesh_study
 from dustfall.files import atomic
-from dustfall.stokes.mesh_study import convergence_table, mesh_study
 
 progress = joblog.start(snakemake.log[0])
 

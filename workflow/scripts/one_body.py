@@ -3,9 +3,9 @@
 import h5py
 
 import joblog
-from dustfall.stokes.mesh import SphereMesh
-from dustfall.stokes.one_body import OneBody
-from dustfall.stokes.spheres import FORCE_UNIT
+from dustfall.spheres import FORCE_UNIT
+from dustfall.stokes.elements.mesh import SphereMesh
+from dustfall.stokes.elements.one_body import OneBody
 
 joblog.start(snakemake.log[0])
 

@@ -10,7 +10,7 @@ from dustfall.dataset import read
 from dustfall.figures.forces import accuracy_vs_cost
 from dustfall.figures.style import save
 from dustfall.forces.formulas import FORMULAS
-from dustfall.forces.models import load_model
+from dustfall.forces.learned import load_model
 
 joblog.start(snakemake.log[0])
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import joblog
 from dustfall.forces.formulas import FORMULAS
-from dustfall.forces.models import load_model
+from dustfall.forces.learned import load_model
 from dustfall.sedimentation.properties import Properties
 from dustfall.sedimentation.settle import settle
 from dustfall.sedimentation.start import read_start

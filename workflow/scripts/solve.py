@@ -3,9 +3,9 @@
 import numpy as np
 
 import joblog
-from dustfall.stokes.many_body import NOT_CONVERGED, OUT_OF_REACH, one_body_response
-from dustfall.stokes.one_body import OneBody
+from dustfall.stokes.elements.one_body import OneBody
 from dustfall.stokes.records import read_plans, solve_shard, write_records
+from dustfall.stokes.solve import NOT_CONVERGED, OUT_OF_REACH, one_body_response
 
 progress = joblog.start(snakemake.log[0])
 

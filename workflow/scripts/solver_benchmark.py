@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 
 import joblog
+from dustfall.benchmarks.solver import methods, time_against_error, time_against_spheres
 from dustfall.figures.benchmark import solver_benchmark
 from dustfall.figures.style import save
 from dustfall.files import atomic
 from dustfall.scenes import random_scenes
-from dustfall.stokes.benchmark import methods, time_against_error, time_against_spheres
-from dustfall.stokes.one_body import OneBody
+from dustfall.stokes.elements.one_body import OneBody
 
 progress = joblog.start(snakemake.log[0])
 params = snakemake.params

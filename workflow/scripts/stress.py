@@ -3,9 +3,9 @@
 import pandas as pd
 
 import joblog
+from dustfall.benchmarks import stress
 from dustfall.files import atomic
-from dustfall.stokes import stress
-from dustfall.stokes.one_body import OneBody
+from dustfall.stokes.elements.one_body import OneBody
 
 progress = joblog.start(snakemake.log[0])
 

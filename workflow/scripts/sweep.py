@@ -5,8 +5,8 @@ import json
 import joblog
 from dustfall.dataset import read, split
 from dustfall.files import atomic
-from dustfall.forces.cross_validation import cross_validate
-from dustfall.forces.training import TrainingSettings
+from dustfall.training.cross_validation import cross_validate
+from dustfall.training.fit import TrainingSettings
 
 progress = joblog.start(snakemake.log[0])
 params = snakemake.params

@@ -4,7 +4,7 @@ import h5py
 
 import joblog
 from dustfall.files import atomic
-from dustfall.stokes.mesh import sphere_mesh
+from dustfall.stokes.elements.mesh import sphere_mesh
 
 joblog.start(snakemake.log[0])
 

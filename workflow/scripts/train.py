@@ -5,7 +5,7 @@ from pathlib import Path
 
 import joblog
 from dustfall.dataset import read, split
-from dustfall.forces.training import TrainingSettings, train_model
+from dustfall.training.fit import TrainingSettings, train_model
 
 progress = joblog.start(snakemake.log[0])
 params = snakemake.params

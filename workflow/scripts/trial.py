@@ -9,7 +9,7 @@ from dustfall.analysis.evaluation import scores
 from dustfall.dataset import read, split
 from dustfall.files import atomic
 from dustfall.forces.features import KINDS
-from dustfall.forces.training import TrainingSettings, train_model
+from dustfall.training.fit import TrainingSettings, train_model
 
 progress = joblog.start(snakemake.log[0])
 params, wildcards = snakemake.params, snakemake.wildcards

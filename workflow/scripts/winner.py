@@ -7,8 +7,8 @@ import pandas as pd
 
 import joblog
 from dustfall.files import atomic
-from dustfall.forces.cross_validation import choose_winner
-from dustfall.forces.models import multiplications
+from dustfall.forces.learned import multiplications
+from dustfall.training.cross_validation import choose_winner
 
 joblog.start(snakemake.log[0])
 

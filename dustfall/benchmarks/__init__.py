@@ -1,0 +1,1 @@
+"""Run time against error, and what strains the solver."""

@@ -1,0 +1,180 @@
+"""Stress tests of the solver's numerical stability: each returns a table of what it measured."""
+
+import time
+
+import numpy as np
+import pandas as pd
+from scipy.spatial.transform import Rotation
+
+from dustfall import STOKES_DRAG
+from dustfall.spheres import FORCE_UNIT, RADIUS
+from dustfall.stokes.elements.mesh import SphereMesh, sphere_mesh
+from dustfall.stokes.elements.one_body import OneBody
+from dustfall.stokes.elements.single_layer import nodal_integrals, self_interaction
+from dustfall.stokes.harmonics import exact_response
+from dustfall.stokes.multipoles import apply_system, couple_scene, solve_scene
+from dustfall.stokes.references.exact_pairs import forces_on_two_spheres
+from dustfall.stokes.solve import one_body_response, plan_scene, response_rows, solve
+from dustfall.stokes.translation import translation_tables
+
+FLOW = np.array([0.36, 0.8, 0.48])
+"""Unit flow in no special direction of the clusters."""
+
+CLUSTERS = {
+    "pair": np.array([[0, 0, 0], [0, 0, 1]]),
+    "triangle": np.array([[0, 0, 0], [1, 0, 0], [0.5, np.sqrt(0.75), 0]]),
+    "chain of three": np.array([[0, 0, 0], [0, 0, 1], [0, 0, -1]]),
+    "six": np.array([[0, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]]),
+}
+"""Centres [d_p] of clusters that touch; times 1 + gap they are that far apart."""
+
+FINE_DEGREE = 72
+"""Degree of all pairs in the solve that clusters of more than two spheres are measured against."""
+
+
+def gaps(body: OneBody, tolerances, sizes=(1.0, 0.1, 1e-2, 1e-3, 1e-4), progress=None):
+    """Clusters at gaps [d_p]: cluster, gap, tolerance, order, iterations, seconds, error, ...
+
+    error: largest of all spheres, over 24, against the exact solution for a pair and otherwise
+    against a solve with FINE_DEGREE. estimate: the solver's own, largest; status: its word on it.
+    """
+    rows = []
+    for name, shape in CLUSTERS.items():
+        for gap in sizes:
+            centres = (1.0 + gap) * shape
+            exact = (
+                forces_on_two_spheres(centres, FLOW)
+                if name == "pair"
+                else fine_forces(centres, FLOW, FINE_DEGREE)
+            )
+            for tolerance in tolerances:
+                rows.append(
+                    {"test": "gap", "case": name, "value": gap}
+                    | _solved(centres, exact, body, tolerance)
+                )
+                if progress is not None:
+                    progress(len(rows), len(CLUSTERS) * len(sizes) * len(tolerances))
+    return pd.DataFrame(rows)
+
+
+def distances(body: OneBody, tolerances, values=(10.0, 100.0, 1e3, 1e4)) -> pd.DataFrame:
+    """Pairs at large distances [d_p], against the exact solution; columns as in `gaps`."""
+    rows = []
+    for distance in values:
+        centres = distance * CLUSTERS["pair"]
+        exact = forces_on_two_spheres(centres, FLOW)
+        for tolerance in tolerances:
+            row = {"test": "distance", "case": "pair", "value": distance}
+            rows.append(row | _solved(centres, exact, body, tolerance))
+    return pd.DataFrame(rows)
+
+
+def invariances(body: OneBody, tolerances, gap=0.01, seed: int = 1) -> pd.DataFrame:
+    """Six nearly touching spheres: moved far away, turned, and with two distances almost alike.
+
+    error: largest change of a force, over 24, after the change is undone. Turned: largest of 10
+    random rotations. Alike: one distance made larger by 1e-12 of itself, which changes the exact
+    force by as little.
+    """
+    centres = (1.0 + gap) * CLUSTERS["six"]
+    rng = np.random.default_rng(seed)
+    rows = []
+    for tolerance in tolerances:
+        response = one_body_response(body, tolerance)
+
+        def forces(places, flow, response=response, tolerance=tolerance):
+            return solve(plan_scene(places, tolerance), response, flow, tolerance).force
+
+        base = forces(centres, FLOW)
+        for distance in (1e3, 1e6):
+            moved = forces(centres + distance * np.array([1.0, -0.7, 0.4]), FLOW)
+            rows.append(_change("moved [d_p]", distance, tolerance, moved - base))
+        turned = []
+        for turn in Rotation.random(10, rng=rng).as_matrix():
+            turned.append(forces(centres @ turn.T, turn @ FLOW) @ turn - base)
+        rows.append(_change("turned", np.nan, tolerance, turned))
+        alike = centres.copy()
+        alike[1] *= 1.0 + 1e-12
+        rows.append(_change("distances alike", 1e-12, tolerance, forces(alike, FLOW) - base))
+    return pd.DataFrame(rows)
+
+
+def turned_mesh(edge: float = 0.5, seed: int = 1) -> pd.DataFrame:
+    """The answer of a template and of the same template turned: relative change, at most."""
+    mesh = sphere_mesh(edge)
+    turn = Rotation.random(rng=np.random.default_rng(seed)).as_matrix()
+    response = OneBody.from_mesh(mesh).response
+    turned = OneBody.from_mesh(SphereMesh(mesh.vertices @ turn.T, mesh.triangles)).response
+    change = np.abs(turned - response).max() / response.max()
+    return pd.DataFrame(
+        [{"test": "turned mesh", "case": "template", "value": edge, "error": change}]
+    )
+
+
+def condition_numbers(edges=(1.0, 0.7, 0.5, 0.35), sizes=(1.0, 0.1, 1e-2, 1e-3), order=10):
+    """Of the single-layer matrix against edge length [radii], and of two spheres against the gap.
+
+    The latter is that of the preconditioned system which GMRES solves, all degrees up to `order`.
+    """
+    rows = []
+    for edge in edges:
+        mesh = sphere_mesh(edge)
+        normals = nodal_integrals(mesh, lambda n: n).ravel()
+        matrix = self_interaction(mesh) + np.outer(normals, normals)
+        rows.append(("condition, one body", f"{len(mesh.triangles)} elements", edge, matrix))
+    for gap in sizes:
+        rows.append(("condition, system", "pair", gap, _pair_system(1.0 + gap, order)))
+    return pd.DataFrame(
+        [
+            {"test": test, "case": case, "value": value, "condition": np.linalg.cond(matrix)}
+            for test, case, value, matrix in rows
+        ]
+    )
+
+
+def fine_forces(centres, flow, degree: int) -> np.ndarray:
+    """Forces (n, 3) [Re_p c_D] with all degrees up to `degree` on every sphere, no tolerance."""
+    orders = np.full((len(centres), len(centres)), degree)
+    np.fill_diagonal(orders, 0)
+    response, tables = response_rows(exact_response(degree)), translation_tables(degree)
+    force, _, _ = solve_scene(
+        np.asarray(centres) / RADIUS, np.asarray(flow), orders, response, tables, 1e-11, 600
+    )
+    return FORCE_UNIT * RADIUS * force
+
+
+def _solved(centres, exact, body, tolerance) -> dict:
+    response = one_body_response(body, tolerance)
+    start = time.perf_counter()
+    plan = plan_scene(centres, tolerance)
+    solution = solve(plan, response, FLOW, tolerance)
+    seconds = time.perf_counter() - start
+    return {
+        "tolerance": tolerance,
+        "order": plan.orders.max(),
+        "iterations": solution.iterations,
+        "seconds": seconds,
+        "error": np.abs(solution.force - exact).max() / STOKES_DRAG,
+        "estimate": solution.error_estimate.max(),
+        "status": ("converged", "not converged", "out of reach")[solution.status],
+    }
+
+
+def _change(case, value, tolerance, difference) -> dict:
+    error = np.abs(difference).max() / STOKES_DRAG
+    return {
+        "test": "invariance", "case": case, "value": value, "tolerance": tolerance, "error": error
+    }  # fmt: skip
+
+
+def _pair_system(distance, order) -> np.ndarray:
+    """Matrix 1 + T K of two spheres at a distance [d_p], column by column."""
+    tables, response = translation_tables(), response_rows(exact_response(order))
+    orders = np.array([[0, order], [order, 0]])
+    scene = couple_scene(distance / RADIUS * CLUSTERS["pair"].astype(float), orders, tables)
+    columns = []
+    for unit in np.eye(6 * (order + 1) ** 2):
+        column = np.empty((len(unit) // 3, 3))
+        apply_system(unit.reshape(-1, 3), scene, orders, response, tables, column)
+        columns.append(column.ravel())
+    return np.array(columns).T

@@ -1,0 +1,1 @@
+"""Boundary elements on gmsh meshes: quadrature, single layer, solve, the paper's formulation."""

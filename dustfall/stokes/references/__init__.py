@@ -1,0 +1,1 @@
+"""Answers that share no code with the solver: exact pairs, fundamental solutions, multiblobs."""

@@ -1,0 +1,1 @@
+"""Hydrodynamics of suspensions by the Rotne-Prager tensor: six spheres, periodic mobility."""

@@ -1,0 +1,85 @@
+"""The networks in PyTorch: several of one shape side by side, as the folds of a validation are.
+
+Side by side they train in half the time: small networks wait for the calls, not the arithmetic.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+import torch
+from torch import nn
+
+from dustfall.forces.features import KINDS, USES
+from dustfall.forces.learned import ACTIVATION, block_widths
+
+
+class Affine(nn.Module):
+    """One affine layer of each of k networks: (k, b, in) to (k, b, out)."""
+
+    def __init__(self, wide: int, narrow: int, gain: float, bias: bool, generators):
+        super().__init__()
+        weights = torch.empty(len(generators), narrow, wide)
+        for weight, generator in zip(weights, generators, strict=True):
+            nn.init.xavier_uniform_(weight, gain, generator)
+        self.weight = nn.Parameter(weights.transpose(1, 2).contiguous())
+        self.bias = nn.Parameter(torch.zeros(len(generators), 1, narrow)) if bias else None
+
+    def forward(self, given: torch.Tensor) -> torch.Tensor:
+        """Multiply each network's rows by its own weights."""
+        if self.bias is None:
+            return torch.bmm(given, self.weight)
+        return torch.baddbmm(self.bias, given, self.weight)
+
+    def of_network(self, k: int) -> tuple[np.ndarray, ...]:
+        """Return the weight (out, in) and, where there is one, the bias (out,) of network k."""
+        arrays = [self.weight[k].T] if self.bias is None else [self.weight[k].T, self.bias[k, 0]]
+        return tuple(array.detach().cpu().numpy().copy() for array in arrays)
+
+
+class Block(nn.Sequential):
+    """Hidden layers of one activation, then a linear output without bias (paper, Eq. forwardPass).
+
+    `widths` run from the inputs over the hidden layers to the outputs.
+    """
+
+    def __init__(self, widths: list[int], activation: str, generators: list[torch.Generator]):
+        layers = []
+        gain = nn.init.calculate_gain(activation)
+        for wide, narrow in pairwise(widths[:-1]):
+            layers.append(Affine(wide, narrow, gain, True, generators))
+            layers.append(nn.Tanh() if activation == "tanh" else nn.ReLU())
+        super().__init__(*layers, Affine(widths[-2], widths[-1], 1.0, False, generators))
+
+
+class BlockSum(nn.Module):
+    """Sum of the blocks' outputs over their uses (a value of `features.USES`), each weighted."""
+
+    def __init__(self, blocks: list[Block], uses):
+        super().__init__()
+        self.blocks = nn.ModuleList(blocks)
+        # The uses of a block follow each other, so that what they see is one piece.
+        self.pieces = []
+        for number in range(len(blocks)):
+            rows = np.flatnonzero(uses[:, 0] == number)
+            first, end = uses[rows[0], 1], uses[rows[-1], 1:].sum()
+            self.pieces.append((slice(rows[0], rows[-1] + 1), slice(first, end)))
+
+    def forward(self, inputs: torch.Tensor, envelope: torch.Tensor) -> torch.Tensor:
+        """Map normalised inputs (k, b, 5, F) and envelope (k, b, uses) to (k, b, 1 or 2)."""
+        k, b = inputs.shape[:2]
+        total = 0.0
+        for (rows, neighbours), block in zip(self.pieces, self.blocks, strict=True):
+            weights = envelope[:, :, rows, None]
+            uses = weights.shape[2]
+            seen = inputs[:, :, neighbours].reshape(k, b * uses, -1)
+            total = total + (block(seen).view(k, b, uses, -1) * weights).sum(2)
+        return total
+
+
+def build(kind: str, layers: str, component: str, generators: list[torch.Generator]) -> nn.Module:
+    """Return networks of one component with random weights, one drawn from each generator."""
+    blocks = [
+        Block(widths, ACTIVATION[component], generators)
+        for widths in block_widths(kind, layers, component)
+    ]
+    return BlockSum(blocks, USES[KINDS[kind].blocks])

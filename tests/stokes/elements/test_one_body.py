@@ -1,0 +1,68 @@
+"""A meshed sphere answers as the spectrum of the single layer on a sphere says."""
+
+import numpy as np
+import pytest
+
+from dustfall.spheres import FORCE_UNIT
+from dustfall.stokes.elements.mesh import sphere_mesh
+from dustfall.stokes.elements.one_body import RESPONSE_DEGREE, OneBody
+from dustfall.stokes.harmonics import single_layer_spectrum
+from dustfall.stokes.solve import one_body_response
+
+SIZES = (0.7, 0.5, 0.35)
+SPECTRUM = single_layer_spectrum(RESPONSE_DEGREE)
+
+
+@pytest.fixture(scope="module")
+def bodies():
+    return [OneBody.from_mesh(sphere_mesh(size)) for size in SIZES]
+
+
+def deviation(body):
+    """Largest relative error of the answer at each degree, (degree + 1,)."""
+    return np.abs(body.response * SPECTRUM - (SPECTRUM > 0.0)).max(axis=1)
+
+
+def test_answer_converges_to_the_spectrum_at_every_degree(bodies):
+    coarse, middle, fine = (deviation(body) for body in bodies)
+    assert fine[0] < 1e-8
+    assert fine[1] < 5e-8
+    assert fine[2] < 2e-6
+    assert fine[-1] < 5e-3
+    # Quadratic Galerkin: errors fall with the fourth power of the edge length or faster.
+    for rough, smooth, ratio in ((coarse, middle, 0.7 / 0.5), (middle, fine, 0.5 / 0.35)):
+        observed = np.log(rough[1:7] / smooth[1:7]) / np.log(ratio)
+        assert observed.min() > 3.0
+        assert np.median(observed) > 4.0
+
+
+def test_drag_converges_to_stokes_drag(bodies):
+    errors = [abs(FORCE_UNIT * body.drag() / 24.0 - 1.0) for body in bodies]
+    assert errors[0] < 2e-6
+    assert errors[1] < 1e-7
+    assert errors[2] < 1e-8
+    assert len(bodies[2].mesh.triangles) <= 320
+
+
+def test_degrees_that_the_mesh_does_not_resolve_come_from_the_spectrum(bodies):
+    taken = [len(one_body_response(bodies[2], t).deviation) for t in (1e-2, 1e-4, 1e-6, 1e-8)]
+    assert taken[0] == RESPONSE_DEGREE + 1
+    assert taken == sorted(taken, reverse=True)
+    assert taken[-1] < taken[0]
+    for tolerance in (1e-2, 1e-4, 1e-6, 1e-8):
+        assert one_body_response(bodies[1], tolerance).error(gap=1e-3) <= 0.12 * tolerance
+
+
+def test_a_mesh_that_is_no_sphere_is_refused(bodies):
+    wrong = OneBody(bodies[0].mesh, bodies[0].factor, 1.01 * bodies[0].response)
+    with pytest.raises(ValueError, match="off for a lone sphere"):
+        one_body_response(wrong, 1e-4)
+
+
+def test_saved_operator_comes_back_bit_for_bit(bodies, tmp_path):
+    body = bodies[0]
+    body.save(tmp_path / "body.h5")
+    again = OneBody.load(tmp_path / "body.h5")
+    for name in ("factor", "response"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(body, name))
+    np.testing.assert_array_equal(again.mesh.triangles, body.mesh.triangles)

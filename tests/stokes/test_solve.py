@@ -1,0 +1,190 @@
+"""Forces on fixed spheres: exact values, symmetries, honest errors."""
+
+import numpy as np
+import pytest
+from scipy.spatial.distance import pdist
+from scipy.spatial.transform import Rotation
+
+from dustfall.scenes import random_scenes
+from dustfall.stokes import forces_on_fixed_spheres
+from dustfall.stokes import solve as many_body
+from dustfall.stokes.references.exact_pairs import pair_drag
+from dustfall.stokes.solve import (
+    CONVERGED,
+    NOT_CONVERGED,
+    OUT_OF_REACH,
+    plan_scene,
+    solve,
+)
+from tests.stokes.clusters import chain, six, triangle
+
+
+def pair(s):
+    return np.array([[0.0, 0.0, 0.0], [0.0, 0.0, s / 2.0]])
+
+
+def ratio(centres, axis, tolerance):
+    """Force along the flow over the isolated drag, sphere by sphere."""
+    return forces_on_fixed_spheres(centres, np.eye(3)[axis], tolerance)[:, axis] / 24.0
+
+
+@pytest.mark.parametrize("s", [2.01, 2.1, 2.5, 3.0, 5.0, 10.0, 20.0, 1000.0])
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-6])
+def test_two_spheres_feel_the_exact_force(s, tolerance):
+    exact = pair_drag(s / 2.0)
+    for axis, value in ((2, exact[0]), (1, exact[1])):
+        assert ratio(pair(s), axis, tolerance) == pytest.approx(float(value), abs=tolerance)
+
+
+@pytest.mark.parametrize("s", [2.1, 3.0, 10.0])
+def test_two_spheres_to_eight_digits(s):
+    exact = pair_drag(s / 2.0)
+    for axis, value in ((2, exact[0]), (1, exact[1])):
+        assert ratio(pair(s), axis, 1e-8) == pytest.approx(float(value), abs=1e-8)
+
+
+# Force over isolated drag by fundamental solutions, to the digits given.
+MORE_SPHERES = [
+    (triangle(2.02), 2, {0: 0.57695375}),
+    (triangle(3.0), 2, {0: 0.6628208613}),
+    (triangle(10.0), 2, {0: 0.8689805385}),
+    (chain(3.0), 2, {0: 0.6468436065, 1: 0.4427135664}),
+    (chain(10.0), 2, {0: 0.8258280577, 1: 0.7546132077}),
+    (chain(3.0), 1, {0: 0.743022433, 1: 0.6181127389}),
+    (six(2.05), 0, {0: 0.1679277798}),
+    (six(2.1), 0, {0: 0.1734726834}),
+    (six(3.0), 0, {0: 0.2649865768}),
+    (six(3.0), 2, {0: 0.3026925458}),
+]
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8])
+@pytest.mark.parametrize(("centres", "axis", "expected"), MORE_SPHERES)
+def test_more_spheres_feel_the_known_force(centres, axis, expected, tolerance):
+    if tolerance == 1e-8 and pdist(centres).min() < 1.2:
+        pytest.skip("nearer than the reference is known to 1e-8")
+    force = ratio(centres, axis, tolerance)
+    for sphere, value in expected.items():
+        assert force[sphere] == pytest.approx(value, abs=tolerance)
+
+
+def test_isolated_sphere_feels_stokes_drag():
+    force = forces_on_fixed_spheres([[3.0, -1.0, 2.0]])
+    np.testing.assert_allclose(force, [[0.0, 24.0, 0.0]], atol=24e-6)
+
+
+def scene(number=11):
+    neighbours, _ = random_scenes(3, "uniform", [number], (5e-4, 1e-3))
+    return np.concatenate([np.zeros((1, 3)), neighbours[0]])
+
+
+@pytest.fixture(scope="module", params=["far", "near"])
+def cluster(request):
+    centres = scene()
+    if request.param == "near":
+        centres[1] = [0.6, 0.5, 0.66]
+    return centres
+
+
+def test_force_turns_with_the_scene(cluster):
+    turn = Rotation.from_rotvec([0.7, -1.1, 0.4]).as_matrix()
+    flow = np.array([0.3, 0.9, -0.2])
+    force = forces_on_fixed_spheres(cluster, flow)
+    turned = forces_on_fixed_spheres(cluster @ turn.T, turn @ flow)
+    np.testing.assert_allclose(turned, force @ turn.T, atol=24e-4)
+
+
+def test_force_does_not_depend_on_place_order_or_speed(cluster):
+    force = forces_on_fixed_spheres(cluster)
+    order = np.array([3, 0, 5, 1, 4, 2])
+    np.testing.assert_allclose(forces_on_fixed_spheres(cluster[order]), force[order], atol=24e-5)
+    np.testing.assert_allclose(forces_on_fixed_spheres(cluster + 1e3), force, atol=24e-5)
+    np.testing.assert_allclose(forces_on_fixed_spheres(cluster, [0, 7.0, 0]), force, rtol=1e-12)
+
+
+def test_force_is_unchanged_by_inversion_and_mirrored_by_mirrors(cluster):
+    force = forces_on_fixed_spheres(cluster)
+    np.testing.assert_allclose(forces_on_fixed_spheres(-cluster), force, atol=24e-4)
+    mirror = np.array([-1.0, 1.0, 1.0])
+    np.testing.assert_allclose(
+        forces_on_fixed_spheres(cluster * mirror), force * mirror, atol=24e-4
+    )
+
+
+def test_resistance_is_symmetric(cluster):
+    """Lorentz reciprocity: the total force matrix of a cluster is symmetric."""
+    total = np.array([forces_on_fixed_spheres(cluster, e, 1e-5).sum(axis=0) for e in np.eye(3)])
+    np.testing.assert_allclose(total, total.T, atol=24e-5)
+    assert np.linalg.eigvalsh(0.5 * (total + total.T)).min() > 0.0
+
+
+@pytest.mark.parametrize("law", ["uniform", "ball"])
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-6])
+def test_error_estimate_bounds_the_error_and_stays_close_to_it(law, tolerance):
+    neighbours, _ = random_scenes(8, law, range(150), (1e-8, 1e-3))
+    true, estimated = [], []
+    for own in neighbours:
+        centres = np.concatenate([np.zeros((1, 3)), own])
+        exact = solve(plan_scene(centres, 1e-8), many_body._template_response(1e-8), tolerance=1e-8)
+        response = many_body._template_response(tolerance)
+        solution = solve(plan_scene(centres, tolerance), response, tolerance=tolerance)
+        true.append(np.abs(solution.force - exact.force).max(axis=1) / 24.0)
+        estimated.append(solution.error_estimate)
+    true, estimated = np.array(true), np.array(estimated)
+    assert true.max() < tolerance
+    for spheres in (slice(0, 1), slice(None)):
+        error, estimate = true[:, spheres], estimated[:, spheres]
+        assert np.mean(estimate >= error) >= 0.95
+        assert 1.0 < np.median(estimate / np.maximum(error, 1e-12)) < 10.0
+
+
+def test_gmres_that_runs_out_is_reported_not_hidden(monkeypatch):
+    plan = plan_scene(six(2.6))
+    monkeypatch.setattr(many_body, "MOST_ITERATIONS", 2)
+    solution = solve(plan, many_body._template_response(1e-4))
+    assert solution.status == NOT_CONVERGED
+    assert solution.residual > 1e-6
+    with pytest.raises(RuntimeError, match="GMRES stopped"):
+        forces_on_fixed_spheres(six(2.6))
+
+
+def test_a_tolerance_out_of_reach_is_said():
+    with pytest.warns(RuntimeWarning, match="exceeds the tolerance"):
+        forces_on_fixed_spheres(triangle(2.0002), tolerance=1e-8)
+    response = many_body._template_response(1e-8)
+    solution = solve(plan_scene(triangle(2.0002), 1e-8), response, tolerance=1e-8)
+    assert solution.status == OUT_OF_REACH
+    assert solution.error_estimate.min() > 1e-8
+
+
+def test_record_tells_the_smallest_gap():
+    response = many_body._template_response(1e-4)
+    solution = solve(plan_scene(chain(3.0)), response)
+    assert solution.minimum_gap == pytest.approx(0.5)
+    assert solution.status == CONVERGED
+    assert solve(plan_scene([[0.0, 0.0, 0.0]]), response).minimum_gap == np.inf
+
+
+@pytest.mark.parametrize(
+    ("centres", "message"),
+    [
+        (np.zeros((2, 2)), "shape"),
+        (np.zeros((0, 3)), "shape"),
+        ([[0, 0, 0], [np.nan, 0, 0]], "sphere 1 is not finite"),
+        ([[0, 0, 0], [5, 0, 0], [5, 0.9, 0]], "spheres 1 and 2 overlap"),
+    ],
+)
+def test_bad_centres_are_refused(centres, message):
+    with pytest.raises(ValueError, match=message):
+        forces_on_fixed_spheres(centres)
+
+
+def test_bad_flow_and_tolerance_are_refused():
+    with pytest.raises(ValueError, match="three finite numbers"):
+        forces_on_fixed_spheres(pair(3.0), flow=[0.0, 1.0])
+    with pytest.raises(ValueError, match=r"tolerance 1.*allowed are"):
+        forces_on_fixed_spheres(pair(3.0), tolerance=1.0)
+
+
+def test_no_flow_gives_no_force():
+    np.testing.assert_array_equal(forces_on_fixed_spheres(pair(3.0), (0, 0, 0)), np.zeros((2, 3)))

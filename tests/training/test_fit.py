@@ -1,0 +1,159 @@
+import numpy as np
+import pytest
+import torch
+
+from dustfall.forces import Reflections
+from dustfall.training import PAPER_SETTINGS, TrainingSettings, train_model
+from tests.forces.scenes import LAYERS, corrected_forces, random_neighbours
+
+
+def r2(predicted, target):
+    return 1 - ((predicted - target) ** 2).sum() / ((target - target.mean(axis=0)) ** 2).sum()
+
+
+def test_idnn_learns_the_streamwise_force_of_unseen_scenes(models):
+    neighbours = random_neighbours(1000, seed=9)
+    force = corrected_forces(neighbours)
+    assert r2(models["idnn"].predict(neighbours)[:, 1], force[:, 1]) > 0.9
+
+
+def test_anchored_model_exceeds_the_reflections_on_unseen_scenes(models):
+    neighbours = random_neighbours(1000, seed=9)
+    force = corrected_forces(neighbours)
+    error = (models["anchored"].predict(neighbours) - force).std(axis=0)
+    baseline = (Reflections().predict(neighbours) - force).std(axis=0)
+    assert (error < 0.6 * baseline).all()
+
+
+def test_reported_scores_are_those_of_the_kept_weights(models, samples):
+    neighbours, force = samples
+    model = models["idnn"]
+    rows = np.sort(np.random.default_rng([1, 0]).permutation(len(neighbours))[:300])
+    scores = model.header["training"]["validation"]
+    predicted = model.predict(neighbours[rows])
+    assert scores["streamwise"]["r2"] == pytest.approx(r2(predicted[:, 1], force[rows, 1]))
+    lateral = r2(predicted[:, [0, 2]], force[rows][:, [0, 2]])
+    assert scores["lateral"]["r2"] == pytest.approx(lateral)
+    for component, history in model.history.items():
+        assert scores[component]["mse"] == pytest.approx(min(history.validation_error), rel=1e-3)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_the_same_seed_gives_the_same_bits(models, samples, tmp_path, threads):
+    settings = TrainingSettings(batch_size=128, epochs=25, validate_every=5)
+    before = torch.get_num_threads()
+    torch.set_num_threads(threads)
+    try:
+        again = train_model("anchored", *samples, LAYERS["anchored"], settings)
+        assert torch.get_num_threads() == threads
+    finally:
+        torch.set_num_threads(before)
+    models["anchored"].save(tmp_path / "first.safetensors")
+    again.save(tmp_path / "again.safetensors")
+    first, second = (tmp_path / f"{name}.safetensors" for name in ("first", "again"))
+    assert first.read_bytes() == second.read_bytes()
+
+
+def test_another_seed_gives_other_weights_and_another_split(samples):
+    settings = TrainingSettings(batch_size=256, epochs=1)
+    one, two = (train_model("dense", *samples, "8", settings, seed=seed) for seed in (1, 2))
+    neighbours = random_neighbours(5)
+    assert (one.predict(neighbours) != two.predict(neighbours)).any()
+    assert one.header["training"]["validation"] != two.header["training"]["validation"]
+
+
+def test_training_stops_when_patience_ends_and_keeps_the_best_epoch(samples):
+    neighbours, force = (array[:200] for array in samples)
+    settings = TrainingSettings(
+        batch_size=0, epochs=400, learning_rate=0.05, schedule="constant", validate_every=5,
+        patience=20,
+    )  # fmt: skip
+    model = train_model("dense", neighbours, force, "30-30", settings)
+    history = model.history["lateral"]
+    assert history.epochs[-1] < 400
+    assert history.epochs[-1] - history.best_epoch >= 20
+    assert min(history.validation_error) == pytest.approx(
+        model.header["training"]["validation"]["lateral"]["mse"], rel=1e-3
+    )
+
+
+def test_paper_settings_are_full_batch_with_patience():
+    assert PAPER_SETTINGS.batch_size == 0
+    assert PAPER_SETTINGS.schedule == "constant"
+    assert (PAPER_SETTINGS.validate_every, PAPER_SETTINGS.patience) == (100, 10_000)
+
+
+def test_progress_counts_to_its_total(samples):
+    seen = []
+    train_model(
+        "dense",
+        *samples,
+        "4",
+        TrainingSettings(epochs=3, batch_size=0),
+        progress=lambda done, total: seen.append((done, total)),
+    )
+    assert seen[-1] == (6, 6)
+    assert seen == sorted(seen)
+
+
+def test_header_tells_how_the_model_was_made(models, samples):
+    header = models["anchored"].header
+    assert header["units"] == {"length": "d_p", "force": "Re_p c_D"}
+    assert header["training"]["samples"] == len(samples[0])
+    assert len(header["training"]["data_sha256"]) == 64
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"batch_size": -1},
+        {"batch_size": 1.5},
+        {"epochs": 0},
+        {"learning_rate": 0.0},
+        {"weight_decay": -1e-3},
+        {"validate_every": 0},
+        {"patience": 0},
+        {"schedule": "linear"},
+    ],
+)
+def test_settings_out_of_range_are_named(wrong):
+    (name,) = wrong
+    with pytest.raises(ValueError, match=name):
+        TrainingSettings(**wrong)
+
+
+def test_samples_that_do_not_fit_are_refused(samples):
+    neighbours, force = samples
+    with pytest.raises(ValueError, match="kind"):
+        train_model("pairs", neighbours, force, "8")
+    with pytest.raises(ValueError, match="force has shape"):
+        train_model("dense", neighbours, force[:10], "8")
+    with pytest.raises(ValueError, match="not finite"):
+        train_model("dense", neighbours, force * np.nan, "8")
+    with pytest.raises(ValueError, match="needs 10"):
+        train_model("dense", neighbours[:5], force[:5], "8")
+    with pytest.raises(ValueError, match="radial_input"):
+        train_model("idnn", neighbours, force, "8/8", radial_input="square")
+
+
+@pytest.mark.skipif(torch.cuda.is_available(), reason="needs a machine without a GPU")
+def test_a_gpu_that_is_not_there_is_named(samples):
+    with pytest.raises(ValueError, match="no GPU"):
+        train_model("dense", *samples, "8", TrainingSettings(epochs=1), device="cuda")
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
+def test_a_gpu_trains_as_well_as_the_processor(samples):
+    settings = TrainingSettings(batch_size=128, epochs=10)
+    errors = [
+        train_model("idnn", *samples, "8/8", settings, device=device).header["training"]
+        for device in ("cpu", "cuda")
+    ]
+    one, other = (error["validation"]["streamwise"]["mse"] for error in errors)
+    assert other == pytest.approx(one, rel=0.2)
+
+
+def test_diverging_training_says_so(samples):
+    settings = TrainingSettings(epochs=20, learning_rate=1e30, batch_size=64)
+    with pytest.raises(FloatingPointError, match="diverged"):
+        train_model("dense", *samples, "8-8", settings)
