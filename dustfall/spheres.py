@@ -1,14 +1,6 @@
-"""The bodies of every scene: equal spheres of diameter 1, and the unit of the force on them."""
+"""Checks of what every solver is given: where spheres are, and the flow that they meet."""
 
 import numpy as np
-
-from dustfall import STOKES_DRAG
-
-RADIUS = 0.5
-"""Radius of every sphere [d_p]."""
-
-FORCE_UNIT = STOKES_DRAG / (3.0 * np.pi)
-"""Re_p c_D for a force of one mu U d_p: an isolated sphere feels 3 pi mu U d_p."""
 
 
 def checked_centres(centres) -> np.ndarray:

@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from dustfall import STOKES_DRAG
 from dustfall.analysis.references import PAPER_FORCE_SUMMARY
+from dustfall.units import STOKES_DRAG
 
 COMPONENTS = {"spanwise": 0, "streamwise": 1, "vertical": 2}
 """Column of each component in a force array: x spanwise, y streamwise, z vertical."""

@@ -5,12 +5,12 @@ import pandas as pd
 from scipy import stats
 from scipy.spatial import cKDTree
 
-from dustfall import STOKES_DRAG
 from dustfall.analysis.references import BATCHELOR_COEFFICIENT
 from dustfall.forces.rotne_prager import RotnePrager, rotne_prager_forces
 from dustfall.sedimentation.neighbours import nearest_neighbours
 from dustfall.sedimentation.start import cube_side, random_positions
-from dustfall.suspension.periodic import HASIMOTO, RADIUS, periodic_mobility
+from dustfall.suspension.periodic import HASIMOTO, periodic_mobility
+from dustfall.units import RADIUS, STOKES_DRAG
 
 FLOW = 1
 """Axis of the flow, as in the force models: y."""

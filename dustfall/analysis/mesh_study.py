@@ -3,8 +3,8 @@
 import numpy as np
 import pandas as pd
 
-from dustfall import STOKES_DRAG
 from dustfall.analysis.references import PAPER_MESH_STUDY
+from dustfall.units import STOKES_DRAG
 
 PAPER = "paper"
 

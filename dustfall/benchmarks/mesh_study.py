@@ -6,10 +6,10 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import brentq
 
-from dustfall import STOKES_DRAG
 from dustfall.stokes.elements.boundary_elements import SCHEMES, forces_by_elements
 from dustfall.stokes.elements.mesh import LARGEST_SIZE, SphereMesh, sphere_mesh
 from dustfall.stokes.elements.outer_sphere import exact_drag_in_outer_sphere, forces_in_outer_sphere
+from dustfall.units import STOKES_DRAG
 
 PAPER_FORMULATION = "paper's formulation (flat, outer sphere)"
 

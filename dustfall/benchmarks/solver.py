@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 from pygrpy.grpy_tensors import muTT
 
-from dustfall import STOKES_DRAG
 from dustfall.stokes.elements.boundary_elements import forces_by_elements
 from dustfall.stokes.elements.mesh import sphere_mesh
 from dustfall.stokes.elements.one_body import OneBody
@@ -17,6 +16,7 @@ from dustfall.stokes.elements.outer_sphere import forces_in_outer_sphere
 from dustfall.stokes.references.fundamental_solutions import reference_forces
 from dustfall.stokes.references.multiblob import multiblob_forces
 from dustfall.stokes.solve import one_body_response, plan_scene, solve
+from dustfall.units import STOKES_DRAG
 
 EXACT = 1e-8
 """Tolerance of the solve that errors are measured against."""

@@ -6,8 +6,6 @@ import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
-from dustfall import STOKES_DRAG
-from dustfall.spheres import FORCE_UNIT, RADIUS
 from dustfall.stokes.elements.mesh import SphereMesh, sphere_mesh
 from dustfall.stokes.elements.one_body import OneBody
 from dustfall.stokes.elements.single_layer import nodal_integrals, self_interaction
@@ -16,6 +14,7 @@ from dustfall.stokes.multipoles import apply_system, couple_scene, solve_scene
 from dustfall.stokes.references.exact_pairs import forces_on_two_spheres
 from dustfall.stokes.solve import one_body_response, plan_scene, response_rows, solve
 from dustfall.stokes.translation import translation_tables
+from dustfall.units import FORCE_UNIT, RADIUS, STOKES_DRAG
 
 FLOW = np.array([0.36, 0.8, 0.48])
 """Unit flow in no special direction of the clusters."""

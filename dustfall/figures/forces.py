@@ -8,7 +8,6 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from dustfall import STOKES_DRAG
 from dustfall.figures.style import (
     CATEGORY_COLOURS,
     COMPONENT_COLOURS,
@@ -21,6 +20,7 @@ from dustfall.figures.style import (
     require_components,
     styled,
 )
+from dustfall.units import STOKES_DRAG
 
 FORCE_UNIT = r"[$\mathrm{Re}_p c_D$]"
 

@@ -5,7 +5,6 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from dustfall import STOKES_DRAG
 from dustfall.analysis.mesh_study import PAPER
 from dustfall.figures.style import (
     CATEGORY_COLOURS,
@@ -17,6 +16,7 @@ from dustfall.figures.style import (
     require,
     styled,
 )
+from dustfall.units import STOKES_DRAG
 
 
 @styled

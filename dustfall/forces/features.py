@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from dustfall import STOKES_DRAG
 from dustfall.forces.frames import (
     CONTACT,
     NEIGHBOURS,
@@ -18,6 +17,7 @@ from dustfall.forces.frames import (
 )
 from dustfall.forces.reflections import reflected_forces
 from dustfall.forces.rotne_prager import rotne_prager_inverse
+from dustfall.units import STOKES_DRAG
 
 COMPONENTS = {"streamwise": [1], "lateral": [0, 2]}
 """Columns of the force that each network predicts."""

@@ -4,10 +4,10 @@ from functools import cache
 
 import numpy as np
 
-from dustfall import STOKES_DRAG
 from dustfall.forces.frames import NEIGHBOURS, check_neighbours, hold_at_contact, sort_by_distance
 from dustfall.stokes.references.exact_pairs import pair_drag
 from dustfall.suspension.six_spheres import POWER, TERMS, six_sphere_forces
+from dustfall.units import STOKES_DRAG
 
 REFLECTIONS = 2
 

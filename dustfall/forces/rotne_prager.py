@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from dustfall import STOKES_DRAG
 from dustfall.forces.frames import check_neighbours, hold_at_contact, sort_by_distance
 from dustfall.suspension.six_spheres import TERMS, six_sphere_forces
+from dustfall.units import STOKES_DRAG
 
 
 class IsolatedStokes:

@@ -17,8 +17,8 @@ split into the part against the motion, -beta v with beta = F'_y / 24, and the r
 import numpy as np
 from numba import njit
 
-from dustfall import STOKES_DRAG
 from dustfall.forces.frames import rotation_to_streamwise
+from dustfall.units import STOKES_DRAG
 
 UP = np.array([0.0, 0.0, 1.0])
 

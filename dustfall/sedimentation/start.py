@@ -7,9 +7,7 @@ import numpy as np
 from numba import njit
 
 from dustfall.sedimentation.neighbours import sort_by_cell
-
-SPHERE_VOLUME = np.pi / 6
-"""Volume of a particle, d_p³."""
+from dustfall.units import SPHERE_VOLUME
 
 SATURATION = 0.38
 """Random sequential addition of equal spheres jams near this volume fraction (0.3841)."""

@@ -11,18 +11,13 @@ from functools import cache
 import numpy as np
 from numba import njit
 
-from dustfall.spheres import (
-    FORCE_UNIT,
-    RADIUS,
-    centre_distances,
-    checked_centres,
-    checked_flow,
-)
+from dustfall.spheres import centre_distances, checked_centres, checked_flow
 from dustfall.stokes.elements.mesh import sphere_mesh
 from dustfall.stokes.elements.one_body import OneBody
 from dustfall.stokes.harmonics import exact_response, response_matrix, single_layer_spectrum
 from dustfall.stokes.multipoles import solve_scene
 from dustfall.stokes.translation import MOST_DEGREE, translation_tables
+from dustfall.units import FORCE_UNIT, RADIUS
 
 TEMPLATE_SIZE = 0.5
 """Edge length [radii] of the template that `forces_on_fixed_spheres` uses: 154 elements."""

@@ -3,8 +3,7 @@
 import numpy as np
 from scipy.special import erfc
 
-RADIUS = 0.5
-"""Of a particle, in d_p."""
+from dustfall.units import RADIUS
 
 HASIMOTO = 2.837297
 """Images slow a sphere in a periodic cube of side L by this times radius / L (Hasimoto 1959)."""

@@ -8,8 +8,8 @@ is what the compiler needs to know before it turns the loops over lanes into vec
 import numpy as np
 from numba import njit
 
-from dustfall import STOKES_DRAG
 from dustfall.forces.frames import NEIGHBOURS
+from dustfall.units import STOKES_DRAG
 
 LANES = 64
 _L = LANES

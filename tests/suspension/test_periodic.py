@@ -5,7 +5,8 @@ import pytest
 
 from dustfall.forces.rotne_prager import rotne_prager_forces
 from dustfall.sedimentation.start import cube_side, random_positions
-from dustfall.suspension.periodic import HASIMOTO, RADIUS, periodic_mobility
+from dustfall.suspension.periodic import HASIMOTO, periodic_mobility
+from dustfall.units import RADIUS
 
 
 @pytest.mark.parametrize("phi", [1e-3, 1e-2, 0.1])

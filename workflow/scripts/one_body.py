@@ -3,9 +3,9 @@
 import h5py
 
 import joblog
-from dustfall.spheres import FORCE_UNIT
 from dustfall.stokes.elements.mesh import SphereMesh
 from dustfall.stokes.elements.one_body import OneBody
+from dustfall.units import FORCE_UNIT
 
 joblog.start(snakemake.log[0])
 

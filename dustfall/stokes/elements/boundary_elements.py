@@ -17,11 +17,12 @@ from scipy.linalg import lu_factor, lu_solve
 from scipy.sparse import csr_array, kron
 from scipy.sparse.linalg import LinearOperator, gmres
 
-from dustfall.spheres import FORCE_UNIT, RADIUS, checked_centres, checked_flow
+from dustfall.spheres import checked_centres, checked_flow
 from dustfall.stokes.elements import single_layer
 from dustfall.stokes.elements.collocation import elements_of
 from dustfall.stokes.elements.collocation import single_layer as collocate_single_layer
 from dustfall.stokes.elements.mesh import SphereMesh
+from dustfall.units import FORCE_UNIT, RADIUS
 
 MOST_ITERATIONS = 300
 

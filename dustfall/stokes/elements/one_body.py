@@ -15,10 +15,10 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from dustfall.files import atomic
-from dustfall.spheres import RADIUS
 from dustfall.stokes.elements.mesh import SphereMesh
 from dustfall.stokes.elements.single_layer import nodal_integrals, self_interaction
 from dustfall.stokes.harmonics import axes_swapped, real_harmonics, total_momentum_projectors
+from dustfall.units import RADIUS
 
 RESPONSE_DEGREE = 10
 """Largest degree of the harmonics for which a template's answer is computed."""

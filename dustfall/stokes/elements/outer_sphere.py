@@ -12,8 +12,7 @@ particles are rigid, the double layer.
 
 import numpy as np
 
-from dustfall import STOKES_DRAG
-from dustfall.spheres import FORCE_UNIT, RADIUS, checked_centres, checked_flow
+from dustfall.spheres import checked_centres, checked_flow
 from dustfall.stokes.elements.boundary_elements import (
     ConstantCollocation,
     one_body_operator,
@@ -21,6 +20,7 @@ from dustfall.stokes.elements.boundary_elements import (
 )
 from dustfall.stokes.elements.collocation import double_layer, single_layer
 from dustfall.stokes.elements.mesh import SphereMesh
+from dustfall.units import FORCE_UNIT, RADIUS, STOKES_DRAG
 
 PAPER_RATIO = 1024.0
 """Diameter of the outer sphere over that of the cluster of particles in the paper."""

@@ -13,7 +13,6 @@ far apart as it is wide.
 import numpy as np
 from numba import njit
 
-from dustfall.spheres import RADIUS
 from dustfall.stokes.elements.element import (
     MOST_HALVINGS,
     MOST_PARTS,
@@ -25,6 +24,7 @@ from dustfall.stokes.elements.element import (
 )
 from dustfall.stokes.elements.mesh import SphereMesh
 from dustfall.stokes.elements.quadrature import touching_pair_rule, triangle_rule
+from dustfall.units import RADIUS
 
 SHAPES = 6
 """Quadratic shape functions on an element: three vertices, then edges 01, 12, 20."""

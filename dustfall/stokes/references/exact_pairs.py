@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numba import njit, vectorize
 
-from dustfall import STOKES_DRAG
+from dustfall.units import STOKES_DRAG
 
 SMALLEST_GAP = 5e-7
 """Gap [d_p] down to which the series are summed; below, the force is linear in the gap.

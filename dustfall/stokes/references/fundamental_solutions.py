@@ -17,7 +17,7 @@ from numba import njit
 from scipy.sparse.linalg import LinearOperator, gmres
 from scipy.spatial.distance import cdist
 
-from dustfall import STOKES_DRAG
+from dustfall.units import STOKES_DRAG
 
 LADDER = [round(200 * 1.5**k) for k in range(9)]
 """Numbers of point forces a sphere that are tried in turn: 200 to 5126."""

@@ -11,7 +11,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import brentq
 from scipy.spatial import ConvexHull
 
-from dustfall import STOKES_DRAG
+from dustfall.units import STOKES_DRAG
 
 
 @cache

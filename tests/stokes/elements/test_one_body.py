@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from dustfall.spheres import FORCE_UNIT
 from dustfall.stokes.elements.mesh import sphere_mesh
 from dustfall.stokes.elements.one_body import RESPONSE_DEGREE, OneBody
 from dustfall.stokes.harmonics import single_layer_spectrum
 from dustfall.stokes.solve import one_body_response
+from dustfall.units import FORCE_UNIT
 
 SIZES = (0.7, 0.5, 0.35)
 SPECTRUM = single_layer_spectrum(RESPONSE_DEGREE)
