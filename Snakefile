@@ -8,6 +8,7 @@ import sys
 
 from snakemake.utils import min_version
 
+from dustfall.forces.registry import trained_models
 from workflow import plan
 from workflow.configuration import ConfigurationError, configure
 from workflow.library import ROOT, library_files

@@ -5,29 +5,39 @@ so that neither the size of a shard nor the order of the jobs shows in it.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pandas as pd
 
-from dustfall.files import atomic
+from dustfall.columns import Column, read_columns, write_columns
 from dustfall.scenes import LAWS
+from dustfall.streams import Purpose, stream
 
 NOT_CONVERGED = 1
 """Status of a scene that is left out (`stokes.solve`, whose import would load its kernels)."""
 
-TEST_SCENES = 1000
-"""Item of the random stream that draws the test scenes."""
+NEIGHBOURS_OF_SCENES = Column("d_p", "centres of the nearest spheres, sorted by distance")
+VOLUME_FRACTION = Column("1", "phi = 15 V_p / (4 pi d_5^3), d_5 the fifth distance")
+NUMBER = Column("1", "number of the scene within its radial law")
 
-DESCRIPTIONS = {
-    "neighbours": ("d_p", "centres of the five nearest spheres, sorted by distance"),
-    "force": ("Re_p c_D", "force on the reference sphere; an isolated one feels 24 along y"),
-    "volume_fraction": ("1", "phi = 15 V_p / (4 pi d_5^3), d_5 the fifth distance"),
-    "radial_law": ("", "law that the distances of the neighbours were drawn by"),
-    "scene": ("", "number of the scene within its radial law"),
+SCENE_COLUMNS = {
+    "neighbours": NEIGHBOURS_OF_SCENES,
+    "volume_fraction": VOLUME_FRACTION,
+    "scene": NUMBER,
 }
+"""Columns of a shard of scenes."""
+
+COLUMNS = {
+    "neighbours": NEIGHBOURS_OF_SCENES,
+    "force": Column("Re_p c_D", "force on the reference sphere; an isolated one feels 24 along y"),
+    "volume_fraction": VOLUME_FRACTION,
+    "radial_law": Column("", "law that the distances of the neighbours were drawn by"),
+    "scene": NUMBER,
+}
+"""Columns of the data set."""
 
 
 @dataclass(frozen=True)
@@ -132,10 +142,13 @@ def check(dataset: Dataset) -> None:
 def split(dataset: Dataset, share: float, seed: int) -> tuple[Dataset, Dataset]:
     """Part the scenes at random into training and test scenes, `share` of each law in the latter.
 
-    Both keep the order of `dataset`; which scenes of a law are in which hangs on the seed and that
-    law alone. Raises ValueError if share lies outside ]0, 1[ or a part would lack a law.
+    Both keep the order of `dataset`; which scenes of a law are in which depends on the seed and
+    that law alone. The neighbours of each scene come in random order, for all models alike: the
+    data set has them sorted, which would tell the order to models that do not sort. Raises
+    ValueError if share lies outside ]0, 1[ or a part would lack a law.
     """
     test = np.zeros(len(dataset), bool)
+    neighbours = dataset.neighbours.copy()
     for law in np.unique(dataset.radial_law):
         rows = np.flatnonzero(dataset.radial_law == law)
         number = round(share * len(rows))
@@ -144,9 +157,15 @@ def split(dataset: Dataset, share: float, seed: int) -> tuple[Dataset, Dataset]:
                 f"a test share of {share} of {len(rows)} scenes of radial law {law} leaves no "
                 "scene on one side"
             )
-        rng = np.random.default_rng([seed, TEST_SCENES, LAWS.index(law)])
-        test[rng.permutation(rows)[:number]] = True
-    return dataset.select(~test), dataset.select(test)
+        item = LAWS.index(law)
+        test[stream(Purpose.TEST_SCENES, seed, item).permutation(rows)[:number]] = True
+        # Row k is that of scene k, whichever scenes are here.
+        draws = stream(Purpose.NEIGHBOUR_ORDER, seed, item)
+        scene = dataset.scene[rows]
+        order = draws.random((scene.max() + 1, neighbours.shape[1]))[scene].argsort(axis=1)
+        neighbours[rows] = np.take_along_axis(neighbours[rows], order[:, :, None], axis=1)
+    shuffled = replace(dataset, neighbours=neighbours)
+    return shuffled.select(~test), shuffled.select(test)
 
 
 def write(path: Path, dataset: Dataset, provenance: Mapping[str, object]) -> None:
@@ -154,26 +173,14 @@ def write(path: Path, dataset: Dataset, provenance: Mapping[str, object]) -> Non
 
     Equal data give equal files: no time stamp goes in.
     """
-    with atomic(path) as temporary, h5py.File(temporary, "w", libver="v110") as file:
-        file.attrs["frame"] = "x spanwise, y streamwise, z vertical; the flow is along +y"
-        for key, value in provenance.items():
-            file.attrs[key] = value
-        for name, (unit, description) in DESCRIPTIONS.items():
-            values = getattr(dataset, name)
-            if name == "radial_law":
-                values = values.astype(bytes)
-            stored = file.create_dataset(name, data=values, track_times=False)
-            stored.attrs["description"] = description
-            if unit:
-                stored.attrs["unit"] = unit
+    frame = {"frame": "x spanwise, y streamwise, z vertical; the flow is along +y"}
+    values = {field.name: getattr(dataset, field.name) for field in fields(dataset)}
+    write_columns(path, COLUMNS, values, frame | dict(provenance))
 
 
 def read(path: Path) -> Dataset:
-    """Read a data set that `write` wrote."""
-    with h5py.File(path) as file:
-        columns = {name: file[name][()] for name in DESCRIPTIONS}
-    columns["radial_law"] = columns["radial_law"].astype(str)
-    return Dataset(**columns)
+    """Read a data set that `write` wrote. Raises ValueError for a damaged file."""
+    return Dataset(**read_columns(path, COLUMNS))
 
 
 def summary(dataset: Dataset, solve: pd.DataFrame) -> pd.DataFrame:
@@ -213,14 +220,15 @@ def summary(dataset: Dataset, solve: pd.DataFrame) -> pd.DataFrame:
 
 
 def _read_shard(shard: Shard) -> tuple[Dataset, pd.DataFrame]:
-    with h5py.File(shard.scenes) as scenes, h5py.File(shard.solutions) as solutions:
-        number = scenes["scene"][()]
+    scenes = read_columns(shard.scenes, SCENE_COLUMNS)
+    with h5py.File(shard.solutions) as solutions:
+        number = scenes["scene"]
         if not np.array_equal(number, solutions["scene"][()]):
             raise ValueError(f"{shard.solutions} does not solve the scenes of {shard.scenes}")
         part = Dataset(
-            neighbours=scenes["neighbours"][()],
+            neighbours=scenes["neighbours"],
             force=solutions["force"][:, 0],
-            volume_fraction=scenes["volume_fraction"][()],
+            volume_fraction=scenes["volume_fraction"],
             radial_law=np.full(len(number), shard.radial_law),
             scene=number,
         )

@@ -6,7 +6,18 @@ import h5py
 import numpy as np
 import pytest
 
-from dustfall.dataset import Dataset, Shard, aggregate, check, read, split, summary, write
+from dustfall.columns import write_columns
+from dustfall.dataset import (
+    SCENE_COLUMNS,
+    Dataset,
+    Shard,
+    aggregate,
+    check,
+    read,
+    split,
+    summary,
+    write,
+)
 
 NUMBERS = {"uniform": 23, "ball": 10}
 
@@ -36,10 +47,8 @@ def write_shards(folder, data: Dataset, size: int, unconverged=()) -> list[Shard
             shard = Shard(
                 law, folder / f"{law}-{first}-{size}.h5", folder / f"{law}-{first}-{size}.solved.h5"
             )
-            with h5py.File(shard.scenes, "w") as file:
-                file["neighbours"] = part.neighbours
-                file["volume_fraction"] = part.volume_fraction
-                file["scene"] = part.scene
+            values = {name: getattr(part, name) for name in SCENE_COLUMNS}
+            write_columns(shard.scenes, SCENE_COLUMNS, values)
             with h5py.File(shard.solutions, "w") as file:
                 file["scene"] = part.scene
                 # The other spheres' forces must not get into the data set.
@@ -79,8 +88,8 @@ def test_what_is_written_is_read_with_units(tmp_path):
     write(tmp_path / "forces.h5", data, {"seed": 5, "phi_range": [1e-8, 1e-3]})
     assert_same(read(tmp_path / "forces.h5"), data)
     with h5py.File(tmp_path / "forces.h5") as file:
-        assert file["neighbours"].attrs["unit"] == "d_p"
-        assert file["force"].attrs["unit"] == "Re_p c_D"
+        assert file["neighbours"].attrs["units"] == "d_p"
+        assert file["force"].attrs["units"] == "Re_p c_D"
         assert file.attrs["seed"] == 5
 
 

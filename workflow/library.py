@@ -34,6 +34,9 @@ def _imports(path: Path) -> frozenset[Path]:
 
 
 def _imported(path: Path) -> Iterator[Path]:
+    if path.name == "__init__.py" and "iter_modules" in _names(path):
+        # A package that looks for its modules itself has them all.
+        yield from (module for module in path.parent.glob("*.py") if module != path)
     for node in ast.walk(_tree(path)):
         if isinstance(node, ast.Import):
             for alias in node.names:

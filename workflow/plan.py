@@ -6,6 +6,9 @@ from math import ceil
 from typing import NamedTuple
 from zlib import crc32
 
+from dustfall.forces.features import KINDS
+from dustfall.forces.registry import settling_models, trained_models
+
 
 class Case(NamedTuple):
     """One run of the sedimentation solver."""
@@ -71,36 +74,18 @@ def laws(config: dict, model: str) -> list[str]:
     return config["idnn"]["laws_of"].get(model, config["idnn"]["laws"])
 
 
-LEARNERS = ("anchored", "idnn")
-"""Models that the learning curve follows."""
-
-ABLATION = (
-    *("dense", "dense_sorted", "pairwise", "idnn", "unit_vectors", "canonical", "residual"),
-    *("anchored", "anchored_pairwise"),
-)
-"""Models of the ablation table: from the dense network to the anchored IDNN, one change a line."""
-
-ON_A_BASELINE = ("residual", "anchored", "anchored_pairwise")
-"""Those of them that stand on a baseline, and are trained like the anchored IDNN."""
-
-
 def learning_curve(config: dict) -> list[str]:
     """Names of the trials of the learning curve, like anchored-30-30_10-250: model, layers, scenes.
 
-    The IDNN has the layers of the paper.
+    A model without layers of its own has those of the ablation, the paper's.
     """
+    idnn = config["idnn"]
     return [
         f"{model}-{layers.replace('/', '_')}-{number}"
-        for model, layers in zip(
-            LEARNERS,
-            (config["idnn"]["layers_of"]["anchored"], config["idnn"]["ablation_layers"]),
-            strict=True,
-        )
+        for model in idnn["learning_curve_of"]
+        for layers in [idnn["layers_of"].get(model, idnn["ablation_layers"])]
         for number in sorted(
-            {
-                min(number, training_scenes(config, model))
-                for number in config["idnn"]["learning_curve"]
-            }
+            {min(number, training_scenes(config, model)) for number in idnn["learning_curve"]}
         )
     ]
 
@@ -113,14 +98,16 @@ def training_scenes(config: dict, model: str) -> int:
 
 
 def ablation(config: dict) -> list[str]:
-    """Names of the trials of the ablation table; their training scenes are of the paper's law."""
+    """Names of the trials of the ablation table, one change a line, from the dense network on.
+
+    Their training scenes are of the laws of all models. A network of one block has the layers of
+    the IDNN's second.
+    """
     layers = config["idnn"]["ablation_layers"]
-    one_block = layers.split("/")[1]
+    first, second = layers.replace("/", "_"), layers.split("/")[1]
     return [
-        f"{model}-{one_block if 'dense' in model or 'pairwise' in model else layers}-all".replace(
-            "/", "_"
-        )
-        for model in ABLATION
+        f"{model}-{first if kind.blocks == 'decomposed' else second}-all"
+        for model, kind in KINDS.items()
     ]
 
 
@@ -130,9 +117,24 @@ def trial_laws(config: dict, model: str, number: str) -> list[str]:
 
 
 def training(config: dict, model: str) -> dict:
-    """Training settings of a model: those of all, and where it differs, its own."""
-    own = "anchored" if model in ON_A_BASELINE else model
+    """Training settings of a model: those of all, and where it differs, its own.
+
+    On a baseline networks overfit where others learn: each such model trains as the anchored one.
+    """
+    own = model if KINDS[model].baseline == "isolated" else "anchored"
     return config["idnn"]["training"] | config["idnn"]["training_of"].get(own, {})
+
+
+def compared_models(config: dict) -> list[str]:
+    """Force models that clouds settle with beside the campaign's; "formulas" is all of them."""
+    settle = config["sedimentation"]
+    formulas = [name for name in settling_models() if name not in trained_models()]
+    named = [
+        name
+        for entry in settle["models"]
+        for name in (formulas if entry == "formulas" else [entry])
+    ]
+    return [name for name in dict.fromkeys(named) if name != settle["model"]]
 
 
 def cases(config: dict) -> dict[str, Case]:
@@ -147,8 +149,7 @@ def cases(config: dict) -> dict[str, Case]:
         ),
         *(
             Case(min(settle["particles"]), phi, 1.0, compared_model=model)
-            for model in settle["models"]
-            if model != settle["model"]
+            for model in compared_models(config)
             for phi in settle["volume_fractions"]
         ),
     ]
@@ -176,6 +177,6 @@ def start_file(config: dict, case: str) -> str | list[str]:
     return pattern.replace("{case}", case) if pattern else []
 
 
-def case_seed(config: dict, start: str) -> int:
-    """Seed of a case's start: it hangs on the campaign's seed and the name of the start alone."""
-    return crc32(f"{config['seed']} {start}".encode())
+def start_stream(start: str) -> int:
+    """Item of the random stream of a case's start: it depends on the name of the start alone."""
+    return crc32(start.encode())

@@ -1,18 +1,30 @@
 """How well force models predict: scores, errors near contact, broken symmetries, cost."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 import pandas as pd
 
 from dustfall.analysis.correlations import coefficient_of_determination
 from dustfall.analysis.distributions import decades
-from dustfall.dataset import Dataset
-from dustfall.forces.features import COMPONENTS
+from dustfall.columns import Column
+from dustfall.dataset import VOLUME_FRACTION, Dataset
+from dustfall.units import COMPONENTS
 
 ANGLE = 1.0
 """Turn about the flow axis [rad] that `symmetry_violations` tries: no part of a full turn."""
+
+
+def prediction_columns(models: Iterable[str]) -> dict[str, Column]:
+    """Columns of the file of predictions on the test scenes: the truth, and each model's force."""
+    return {
+        "target": Column("Re_p c_D", "force on the reference sphere"),
+        "gap": Column("d_p", "surface distance of the nearest neighbour"),
+        "volume_fraction": VOLUME_FRACTION,
+        "radial_law": Column("", "law that the distances of the neighbours were drawn by"),
+        **{model: Column("Re_p c_D", f"force predicted by {model}") for model in models},
+    }
 
 
 def scores(predictions: Mapping[str, np.ndarray], test: Dataset) -> pd.DataFrame:

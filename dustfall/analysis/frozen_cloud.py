@@ -6,10 +6,12 @@ from scipy import stats
 from scipy.spatial import cKDTree
 
 from dustfall.analysis.references import BATCHELOR_COEFFICIENT
-from dustfall.forces.rotne_prager import RotnePrager, rotne_prager_forces
+from dustfall.forces.formulas import FORMULAS
 from dustfall.sedimentation.neighbours import nearest_neighbours
-from dustfall.sedimentation.start import cube_side, random_positions
+from dustfall.sedimentation.start import random_positions
+from dustfall.sedimentation.state import box_length
 from dustfall.suspension.periodic import HASIMOTO, periodic_mobility
+from dustfall.suspension.rotne_prager import rotne_prager_forces
 from dustfall.units import RADIUS, STOKES_DRAG
 
 FLOW = 1
@@ -28,7 +30,7 @@ def five_neighbour_drag(positions, side: float) -> np.ndarray:
     Each sphere sees its five nearest alone, in unbounded fluid (inverted Rotne-Prager mobility).
     """
     neighbours, _ = nearest_neighbours(positions, side)
-    return RotnePrager().predict(neighbours)[:, FLOW] / STOKES_DRAG
+    return FORMULAS["rotne_prager"].predict(neighbours)[:, FLOW] / STOKES_DRAG
 
 
 def drag_among_nearest(positions, side: float, references, count: int) -> np.ndarray:
@@ -91,7 +93,7 @@ def frozen_cloud_table(
         found: dict[tuple, list[float]] = {}
         for cloud in range(clouds):
             rng = np.random.default_rng([seed, case, cloud])
-            side = cube_side(particles, phi)
+            side = box_length(particles, phi)
             positions = random_positions(rng, particles, phi)
             five = five_neighbour_drag(positions, side)
             drag, velocity = all_particle_motion(positions, side)

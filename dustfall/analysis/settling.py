@@ -244,14 +244,14 @@ def settling_in_time(runs: Iterable[xr.Dataset], points=500) -> pd.DataFrame:
 
     Parameters: `runs`, series datasets; `points`, the most rows a run keeps (evenly spaced steps,
     first and last among them). Of each (model, n, phi) the runs of the lowest Galileo number are
-    kept, and of these the one with the lowest seed.
+    kept, and of these the one of the lowest random stream.
 
     Returns the columns model, n, volume_fraction, galileo, seed, time [tau], mean [v_s],
     variance [v_s^2]. Raises ValueError where there is no run or an attribute is missing.
     """
     chosen: dict[tuple, tuple] = {}
     for run in runs:
-        case, seed = case_of(run), int(run.attrs.get("seed", 0))
+        case, seed = case_of(run), int(run.attrs.get("stream", 0))
         key = (case["model"], case["n"], case["volume_fraction"])
         if key not in chosen or (case["galileo"], seed) < chosen[key][:2]:
             chosen[key] = (case["galileo"], seed, run)

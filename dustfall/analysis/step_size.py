@@ -29,7 +29,7 @@ def step_size_table(runs: Iterable[xr.Dataset], start: float, together: float) -
     columns step [tau]; for the mean over particles of 1/beta and of the settling velocity, and
     for the variance of the latter, the steady value and the half-width of its 95 % interval;
     early_error, the largest difference up to `together` of mean 1/beta from the smallest
-    step's; new_neighbours and only_fifth (of these) a step; overlaps, the mean number of pairs
+    step's; new_neighbours and only_farthest (of these) a step; overlaps, the mean number of pairs
 
     Raises
     ------
@@ -50,9 +50,9 @@ def step_size_table(runs: Iterable[xr.Dataset], start: float, together: float) -
         finest = np.interp(early["time"], runs[0]["time"], runs[0]["inverse_beta_mean"])
         row["early_error"] = float(np.abs(early["inverse_beta_mean"] - finest).max())
         changes = steady["new_neighbours"].values
-        only_fifth = np.nan_to_num(steady["only_fifth"].values)
+        farthest = np.nan_to_num(steady["only_farthest"].values)
         row["new_neighbours"] = changes.mean()
-        row["only_fifth"] = np.average(only_fifth, weights=changes) if changes.any() else np.nan
+        row["only_farthest"] = np.average(farthest, weights=changes) if changes.any() else np.nan
         row["overlaps"] = float(steady["overlaps"].mean())
         rows.append(row)
     return pd.DataFrame(rows)

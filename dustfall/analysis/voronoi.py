@@ -15,7 +15,8 @@ from dustfall.analysis.references import (
     POISSON_VORONOI_VARIANCE,
 )
 from dustfall.analysis.settling import CASE, case_of, correlation_length, from_time
-from dustfall.sedimentation.start import cube_side, random_positions
+from dustfall.sedimentation.start import random_positions
+from dustfall.sedimentation.state import box_length
 
 VOLUME_EDGES = np.linspace(0, 4, 41)
 """Bins of V/mean(V); of a Poisson process fewer than one cell in 10^5 is larger."""
@@ -113,7 +114,7 @@ def random_sphere_variance(
     for cloud in range(clouds):
         rng = np.random.default_rng([seed, cloud])
         positions = random_positions(rng, particles, volume_fraction)
-        volumes = voronoi_volumes(positions, cube_side(particles, volume_fraction))
+        volumes = voronoi_volumes(positions, box_length(particles, volume_fraction))
         found.append(volumes.var() / volumes.mean() ** 2)
     half = stats.t.ppf(0.975, clouds - 1) * np.std(found, ddof=1) / np.sqrt(clouds)
     mean = float(np.mean(found))

@@ -7,8 +7,8 @@ import onnx
 from onnx import TensorProto, helper, numpy_helper
 
 from dustfall.files import atomic
-from dustfall.forces.features import COMPONENTS
 from dustfall.forces.learned import ACTIVATION, LearnedModel, Network
+from dustfall.units import COMPONENTS
 
 OPSET = 17
 IR_VERSION = 8
@@ -17,7 +17,7 @@ IR_VERSION = 8
 def export_onnx(model: LearnedModel, path) -> None:
     """Write the trained networks of `model` to `path`.
 
-    The graph, in float64, maps what `features.describe` returns, `inputs` (m, 5, F) and `envelope`
+    The graph, in float64, maps what `features.describe` returns, `inputs` (m, k, F) and `envelope`
     (m, uses), to `streamwise` (m, 1) and `lateral` (m, 2) [Re_p c_D]: what the networks add, in the
     frame of the model, to its baseline. Frame and baseline are geometry and not in it. The model's
     header is the metadata "header", as JSON. Needs the package onnx.
@@ -29,7 +29,7 @@ def export_onnx(model: LearnedModel, path) -> None:
     graph = helper.make_graph(
         nodes,
         f"dustfall {model.name}",
-        [_value("inputs", 5, features), _value("envelope", uses)],
+        [_value("inputs", model.neighbours, features), _value("envelope", uses)],
         [_value(component, len(columns)) for component, columns in COMPONENTS.items()],
         constants,
     )

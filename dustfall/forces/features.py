@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from dustfall.forces.formulas import FORMULAS
 from dustfall.forces.frames import (
-    CONTACT,
-    NEIGHBOURS,
     canonical_frame,
     hold_at_contact,
     lateral_to_canonical_frame,
@@ -15,53 +14,81 @@ from dustfall.forces.frames import (
     sort_by_distance,
     spherical_coordinates,
 )
-from dustfall.forces.reflections import reflected_forces
-from dustfall.forces.rotne_prager import rotne_prager_inverse
-from dustfall.units import STOKES_DRAG
-
-COMPONENTS = {"streamwise": [1], "lateral": [0, 2]}
-"""Columns of the force that each network predicts."""
+from dustfall.units import COMPONENTS, CONTACT
 
 RADIAL_INPUTS = ("distance", "logarithm")
+"""What spherical coordinates give a network for the distance: itself, or its logarithm."""
+
+FEWEST = {"dense": 1, "pairwise": 1, "decomposed": 3}
+"""Fewest neighbours that give each block of a network something to see."""
 
 
-USES = {
-    "dense": np.array([[0, 0, NEIGHBOURS]]),
-    "pairwise": np.array([[0, j, 1] for j in range(NEIGHBOURS)]),
-    "decomposed": np.array([[0, 0, 2], [1, 2, 1], [1, 3, 1], [1, 4, 1]]),
-}
-"""How the outputs of a network's blocks add up; each row one use: block, first neighbour, number
-of neighbours. Decomposed: F = F_12 + F_3 + F_4 + F_5 (paper, Fig. nnModel)."""
+def block_uses(blocks: str, neighbours: int) -> np.ndarray:
+    """How the outputs of a network's blocks add up, (uses, 3).
+
+    Each row is one use: block, first neighbour, number of neighbours. blocks: "dense", one block
+    for all neighbours; "pairwise", one for each neighbour alone; "decomposed", one for the two
+    nearest and one for each other: F = F_12 + F_3 + F_4 + F_5 (paper, Fig. nnModel).
+    Raises ValueError for too few neighbours.
+    """
+    if neighbours < FEWEST[blocks]:
+        raise ValueError(
+            f"{neighbours} neighbours: a {blocks} network needs at least {FEWEST[blocks]}"
+        )
+    if blocks == "dense":
+        return np.array([[0, 0, neighbours]])
+    if blocks == "pairwise":
+        return np.array([[0, j, 1] for j in range(neighbours)])
+    return np.array([[0, 0, 2], *([1, j, 1] for j in range(2, neighbours))])
 
 
 @dataclass(frozen=True)
 class Kind:
     """A kind of learned model: which blocks, and which frame, inputs and baseline they stand on.
 
-    blocks: a key of `USES`. ordered: neighbours sorted by distance, else taken as they are given.
-    unit_vectors: inputs 1/r, log r and the unit vector, else spherical coordinates.
-    canonical: canonical frame of the symmetries, else the flow's.
-    baseline: what the networks' output adds to, "stokes", "rotne_prager" or "reflections".
+    title: what figures and tables call it. blocks: as `block_uses` takes them. ordered: neighbours
+    sorted by distance, else taken as they are given. unit_vectors: inputs 1/r, log r and the unit
+    vector, else spherical coordinates. canonical: canonical frame of the symmetries, else the
+    flow's. baseline: formula that the networks' output adds to. final: the campaign trains it on
+    all that it may learn from; else it is one step of the ablation.
     """
 
+    title: str
     blocks: str
     ordered: bool = True
     unit_vectors: bool = False
     canonical: bool = False
-    baseline: str = "stokes"
+    baseline: str = "isolated"
+    final: bool = True
 
 
 KINDS = {
-    "dense": Kind("dense", ordered=False),
-    "dense_sorted": Kind("dense"),
-    "pairwise": Kind("pairwise"),
-    "idnn": Kind("decomposed"),
-    "unit_vectors": Kind("decomposed", unit_vectors=True),
-    "canonical": Kind("decomposed", unit_vectors=True, canonical=True),
-    "residual": Kind("decomposed", unit_vectors=True, canonical=True, baseline="rotne_prager"),
-    "anchored": Kind("decomposed", unit_vectors=True, canonical=True, baseline="reflections"),
+    "dense": Kind("dense network", "dense", ordered=False),
+    "dense_sorted": Kind("dense network, sorted", "dense"),
+    "pairwise": Kind("pairwise network", "pairwise"),
+    "idnn": Kind("IDNN", "decomposed"),
+    "unit_vectors": Kind("IDNN, unit vectors", "decomposed", unit_vectors=True, final=False),
+    "canonical": Kind(
+        "IDNN, canonical frame", "decomposed", unit_vectors=True, canonical=True, final=False
+    ),
+    "residual": Kind(
+        "IDNN on Rotne–Prager",
+        "decomposed",
+        unit_vectors=True,
+        canonical=True,
+        baseline="rotne_prager",
+        final=False,
+    ),
+    "anchored": Kind(
+        "anchored IDNN", "decomposed", unit_vectors=True, canonical=True, baseline="reflections"
+    ),
     "anchored_pairwise": Kind(
-        "pairwise", unit_vectors=True, canonical=True, baseline="reflections"
+        "anchored pairwise network",
+        "pairwise",
+        unit_vectors=True,
+        canonical=True,
+        baseline="reflections",
+        final=False,
     ),
 }
 """The paper's dense ANN (flat vector of unsorted neighbours) and the same sorted; its first-order
@@ -72,7 +99,7 @@ block alone (Seyed-Ahmadi & Wachs 2022); its IDNN; then, one change at a time, t
 class Scenes:
     """Scenes as a network takes them.
 
-    inputs: (m, 5, F), not yet normalised. envelope: (m, uses), weight of each use of a block.
+    inputs: (m, k, F), not yet normalised. envelope: (m, uses), weight of each use of a block.
     baseline: (m, 3), force in the flow frame that the network's output adds to. axes: (m, 2, 2),
     lateral axes of the frame of that output, where it is not the flow's.
     """
@@ -96,8 +123,12 @@ class Scenes:
         return self.baseline[:, COMPONENTS[component]] + residual
 
 
+_FADING = {"isolated": 1, "rotne_prager": 1, "reflections": 4}
+"""Power of 1/distance by which what the networks add to a baseline falls, as its error does."""
+
+
 def describe(kind: str, neighbours: np.ndarray, radial_input: str, largest: float) -> Scenes:
-    """Return the scenes (m, 5, 3), in d_p, as networks of `kind` take them.
+    """Return the scenes (m, k, 3), in d_p, as networks of `kind` take them.
 
     `radial_input` is what spherical coordinates give for the distance: itself ("distance") or its
     natural logarithm. `largest` is the largest distance trained on: the networks see neighbours
@@ -111,10 +142,10 @@ def describe(kind: str, neighbours: np.ndarray, radial_input: str, largest: floa
         neighbours = sort_by_distance(neighbours)
     neighbours = hold_at_contact(neighbours)
     seen, axes = canonical_frame(neighbours) if layout.canonical else (neighbours, None)
-    first = USES[layout.blocks][:, 1]
+    first = block_uses(layout.blocks, neighbours.shape[1])[:, 1]
     if layout.unit_vectors:
         inputs = _unit_vectors(seen, largest)
-        power = 4 if layout.baseline == "reflections" else 1
+        power = _FADING[layout.baseline]
         envelope = inputs[:, first, 0] ** power
     else:
         inputs = spherical_coordinates(seen)
@@ -122,25 +153,15 @@ def describe(kind: str, neighbours: np.ndarray, radial_input: str, largest: floa
         radius = np.minimum(inputs[:, :, 0], largest)
         inputs[:, :, 0] = np.log(radius) if radial_input == "logarithm" else radius
         envelope = np.repeat(fade[:, None], len(first), axis=1)
-    return Scenes(inputs, envelope, _baseline(layout.baseline, neighbours), axes)
-
-
-def _baseline(name, neighbours):
-    if name == "reflections":
-        return reflected_forces(neighbours)
-    if name == "rotne_prager":
-        return rotne_prager_inverse(neighbours)
-    force = np.zeros((len(neighbours), 3))
-    force[:, 1] = STOKES_DRAG
-    return force
+    return Scenes(inputs, envelope, FORMULAS[layout.baseline].force(neighbours), axes)
 
 
 @njit(cache=True, nogil=True)
 def _unit_vectors(neighbours, largest):
-    count = neighbours.shape[0]
-    inputs = np.empty((count, NEIGHBOURS, 5))
+    count, others, _ = neighbours.shape
+    inputs = np.empty((count, others, 5))
     for m in range(count):
-        for j in range(NEIGHBOURS):
+        for j in range(others):
             x, y, z = neighbours[m, j, 0], neighbours[m, j, 1], neighbours[m, j, 2]
             distance = np.sqrt(x * x + y * y + z * z)
             inputs[m, j, 0] = CONTACT / distance

@@ -6,10 +6,10 @@ The flow frame has x spanwise, y streamwise (the flow runs along +y) and z verti
 import numpy as np
 from numba import njit
 
-NEIGHBOURS = 5
+from dustfall.units import CONTACT
 
-CONTACT = 1.0
-"""Centre distance of two touching spheres, in d_p."""
+MOST_NEIGHBOURS = 50
+"""Most neighbours of a scene: the dense system of a sphere and its neighbours is then 153 x 153."""
 
 _ZERO = 1e-9  # relative size below which a coordinate has no sign that rounding would keep
 
@@ -83,17 +83,19 @@ def spherical_coordinates(positions) -> np.ndarray:
     return coordinates
 
 
-def check_neighbours(neighbours) -> np.ndarray:
-    """Return the neighbours as contiguous float64 (m, 5, 3), or raise ValueError.
+def check_neighbours(neighbours, number: int | None = None) -> np.ndarray:
+    """Return the neighbours as contiguous float64 (m, k, 3), or raise ValueError.
 
-    A wrong shape, a value that is not finite and a neighbour at the centre of the reference
-    sphere (it has no direction) are refused.
+    A wrong shape, another `number` k than the given one, a value that is not finite and a
+    neighbour at the centre of the reference sphere (it has no direction) are refused.
     """
     neighbours = np.ascontiguousarray(neighbours, dtype=float)
-    if neighbours.ndim != 3 or neighbours.shape[1:] != (NEIGHBOURS, 3):
+    allowed = range(1, MOST_NEIGHBOURS + 1) if number is None else (number,)
+    if neighbours.ndim != 3 or neighbours.shape[2] != 3 or neighbours.shape[1] not in allowed:
+        expected = f"k from 1 to {MOST_NEIGHBOURS}" if number is None else f"k = {number}"
         raise ValueError(
-            f"neighbours have shape {neighbours.shape}; a model takes (m, {NEIGHBOURS}, 3), "
-            "the Cartesian positions of five neighbours in d_p"
+            f"neighbours have shape {neighbours.shape}; the model takes (m, k, 3), the Cartesian "
+            f"positions of k neighbours in d_p, {expected}"
         )
     if not np.isfinite(neighbours).all():
         scene = int(np.flatnonzero(~np.isfinite(neighbours).all(axis=(1, 2)))[0])
@@ -111,15 +113,16 @@ def check_neighbours(neighbours) -> np.ndarray:
 
 @njit(cache=True, nogil=True)
 def sort_by_distance(neighbours):
-    """Return scenes (m, 5, 3) with neighbours in order of distance from the reference sphere.
+    """Return scenes (m, k, 3) with neighbours in order of distance from the reference sphere.
 
     Equal distances are put in order by y, x, z, so that the given order never matters.
     """
     result = np.empty_like(neighbours)
-    square = np.empty(NEIGHBOURS)
-    order = np.empty(NEIGHBOURS, np.int64)
+    count = neighbours.shape[1]
+    square = np.empty(count)
+    order = np.empty(count, np.int64)
     for m in range(neighbours.shape[0]):
-        for j in range(NEIGHBOURS):
+        for j in range(count):
             own = neighbours[m, j, 0] ** 2 + neighbours[m, j, 1] ** 2 + neighbours[m, j, 2] ** 2
             i = j
             while i > 0 and (
@@ -129,7 +132,7 @@ def sort_by_distance(neighbours):
                 square[i], order[i] = square[i - 1], order[i - 1]
                 i -= 1
             square[i], order[i] = own, j
-        for i in range(NEIGHBOURS):
+        for i in range(count):
             for k in range(3):
                 result[m, i, k] = neighbours[m, order[i], k]
     return result
@@ -145,10 +148,10 @@ def _is_before(neighbours, m, j, i):
 
 @njit(cache=True, nogil=True)
 def hold_at_contact(neighbours):
-    """Return scenes (m, 5, 3) where each neighbour closer than one d_p is moved out to one d_p."""
+    """Return scenes (m, k, 3) where each neighbour closer than one d_p is moved out to one d_p."""
     result = np.empty_like(neighbours)
     for m in range(neighbours.shape[0]):
-        for j in range(NEIGHBOURS):
+        for j in range(neighbours.shape[1]):
             distance = _length(neighbours[m, j])
             scale = CONTACT / distance if distance < CONTACT else 1.0
             for k in range(3):
@@ -166,35 +169,36 @@ def canonical_frame(neighbours):
     (z = 0, x >= 0) and mirrored until neighbour 2 has z >= 0. Where a neighbour cannot decide
     (its coordinate is zero to rounding), the next one does.
 
-    Takes `neighbours` (m, 5, 3), sorted; returns the canonical neighbours (m, 5, 3) and the
+    Takes `neighbours` (m, k, 3), sorted; returns the canonical neighbours (m, k, 3) and the
     lateral axes (m, 2, 2): the force in the flow frame has the lateral part
     `(F_x, F_z) = F'_x axes[0] + F'_z axes[1]`, see `lateral_to_flow_frame`.
     """
     canonical = np.empty_like(neighbours)
+    count = neighbours.shape[1]
     axes = np.empty((neighbours.shape[0], 2, 2))
     for m in range(neighbours.shape[0]):
         scene = neighbours[m]
         inversion = 1.0
-        for j in range(NEIGHBOURS):
+        for j in range(count):
             if abs(scene[j, 1]) > _ZERO * _length(scene[j]):
                 inversion = 1.0 if scene[j, 1] > 0.0 else -1.0
                 break
         cosine, sine = 1.0, 0.0
-        for j in range(NEIGHBOURS):
+        for j in range(count):
             rho = np.sqrt(scene[j, 0] ** 2 + scene[j, 2] ** 2)
             if rho > _ZERO * _length(scene[j]):
                 cosine = inversion * scene[j, 0] / rho
                 sine = inversion * scene[j, 2] / rho
                 break
         mirror = 1.0
-        for j in range(NEIGHBOURS):
+        for j in range(count):
             z = inversion * (cosine * scene[j, 2] - sine * scene[j, 0])
             if abs(z) > _ZERO * _length(scene[j]):
                 mirror = 1.0 if z > 0.0 else -1.0
                 break
         axes[m, 0, 0], axes[m, 0, 1] = cosine, sine
         axes[m, 1, 0], axes[m, 1, 1] = -mirror * sine, mirror * cosine
-        for j in range(NEIGHBOURS):
+        for j in range(count):
             x, z = inversion * scene[j, 0], inversion * scene[j, 2]
             canonical[m, j, 0] = cosine * x + sine * z
             canonical[m, j, 1] = inversion * scene[j, 1]

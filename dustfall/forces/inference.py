@@ -18,7 +18,7 @@ _LARGEST = 18.0  # tanh of it is one to 5e-16
 def evaluate(inputs, envelope, mean, scale, parameters, widths, uses, bounded, outputs):
     """Return the network's output (m, outputs) in units of its target's scale.
 
-    inputs (m, 5, F) with their `mean` and `scale` (F,); envelope (m, uses); `parameters`, one
+    inputs (m, k, F) with their `mean` and `scale` (F,); envelope (m, uses); `parameters`, one
     vector per block (rows of a matrix, padded): each layer's weights (out, in) and biases (out,);
     `widths` (blocks, layers + 1), padded with zeros; `uses` (uses, 3), each row one use of a block:
     block, first neighbour, number of neighbours. `bounded` tells tanh from ReLU.

@@ -12,12 +12,13 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save_file
 
 from dustfall.files import atomic
-from dustfall.forces.features import COMPONENTS, KINDS, RADIAL_INPUTS, USES, describe
-from dustfall.forces.frames import check_neighbours
+from dustfall.forces.features import KINDS, RADIAL_INPUTS, block_uses, describe
+from dustfall.forces.frames import MOST_NEIGHBOURS, check_neighbours
 from dustfall.forces.inference import evaluate
+from dustfall.units import COMPONENTS, NEIGHBOURS
 
 FORMAT = "dustfall force model"
-VERSION = 3
+VERSION = 4
 SHIPPED = Path(__file__).parent / "data" / "anchored.safetensors"
 
 ACTIVATION = {"streamwise": "relu", "lateral": "tanh"}
@@ -46,22 +47,22 @@ def parse_layers(layers: str, kind: str) -> list[list[int]]:
     return [[int(width) for width in row] for row in widths]
 
 
-def block_widths(kind: str, layers: str, component: str) -> list[list[int]]:
+def block_widths(kind: str, layers: str, component: str, neighbours: int) -> list[list[int]]:
     """Return each block's widths from its inputs over the hidden layers to its outputs."""
     layout = KINDS[kind]
-    seen = {block: number for block, _, number in USES[layout.blocks].tolist()}
+    seen = {block: number for block, _, number in block_uses(layout.blocks, neighbours).tolist()}
     return [
         [seen[block] * INPUTS[layout.unit_vectors], *hidden, len(COMPONENTS[component])]
         for block, hidden in enumerate(parse_layers(layers, kind))
     ]
 
 
-def multiplications(kind: str, layers: str, component: str) -> int:
+def multiplications(kind: str, layers: str, component: str, neighbours: int = NEIGHBOURS) -> int:
     """Return how often a prediction of one component multiplies by a weight: its cost."""
-    widths = block_widths(kind, layers, component)
+    widths = block_widths(kind, layers, component, neighbours)
     return sum(
         wide * narrow
-        for block in USES[KINDS[kind].blocks][:, 0]
+        for block in block_uses(KINDS[kind].blocks, neighbours)[:, 0]
         for wide, narrow in pairwise(widths[block])
     )
 
@@ -70,7 +71,7 @@ def multiplications(kind: str, layers: str, component: str) -> int:
 class Network:
     """Trained weights of one component's network.
 
-    uses: how its blocks are used, a value of `USES`. blocks: per block, per layer, the weight
+    uses: how its blocks are used, see `block_uses`. blocks: per block, per layer, the weight
     (out, in) and the bias (out,), the last layer without bias. mean and scale (F,) normalise the
     inputs; `unit` is the size of the output in Re_p c_D.
     """
@@ -88,7 +89,7 @@ class Network:
         return sum(array.size for block in self.blocks for layer in block for array in layer)
 
     def residual(self, inputs: np.ndarray, envelope: np.ndarray) -> np.ndarray:
-        """Return the output (m, 1 or 2) in Re_p c_D for inputs (m, 5, F), envelope (m, uses)."""
+        """Return the output (m, 1 or 2) in Re_p c_D for inputs (m, k, F), envelope (m, uses)."""
         parameters, widths = self._packed
         return self.unit * evaluate(
             inputs,
@@ -141,17 +142,22 @@ class LearnedModel:
         """Kind of the model, as in `KINDS`."""
         return self.header["kind"]
 
+    @property
+    def neighbours(self) -> int:
+        """Number of neighbours that the model takes."""
+        return self.header["neighbours"]
+
     def predict(self, neighbours) -> np.ndarray:
         """Return the force (m, 3) in Re_p c_D on the reference sphere at the origin.
 
-        Parameters: `neighbours` (m, 5, 3), Cartesian, in d_p, in the frame of the flow (x spanwise,
+        Parameters: `neighbours` (m, k, 3), Cartesian, in d_p, in the frame of the flow (x spanwise,
         y streamwise, z vertical). Their order does not matter, except for the paper's dense network
         of unsorted neighbours. Raises ValueError for neighbours of another shape, not finite, or at
         the centre of the reference sphere.
         """
         scenes = describe(
             self.name,
-            check_neighbours(neighbours),
+            check_neighbours(neighbours, self.neighbours),
             self.header["radial_input"],
             self.header["largest_distance"],
         )
@@ -164,7 +170,7 @@ class LearnedModel:
     def save(self, path) -> None:
         """Write the model to `path`: safetensors, with the header as JSON in its metadata."""
         tensors = _tensors(self.networks)
-        header = {**self.header, "checksum": _checksum(tensors)}
+        header = {**self.header, "checksum": _checksum(self.header, tensors)}
         with atomic(path) as temporary:
             save_file(tensors, temporary, {"header": json.dumps(header, sort_keys=True)})
 
@@ -193,8 +199,8 @@ def load_model(path=None) -> LearnedModel:
         raise ValueError(
             f"{path} has format version {header.get('version')!r}; this dustfall reads {VERSION}"
         )
-    if header.pop("checksum", None) != _checksum(tensors):
-        raise ValueError(f"{path} is damaged: its weights do not match their checksum")
+    if header.pop("checksum", None) != _checksum(header, tensors):
+        raise ValueError(f"{path} is damaged: header and weights do not match their checksum")
     try:
         networks = {component: _network(tensors, header, component) for component in COMPONENTS}
     except (KeyError, TypeError, ValueError) as error:
@@ -218,6 +224,9 @@ def _tensors(networks):
 def _network(tensors, header, component):
     if header["radial_input"] not in RADIAL_INPUTS or not header["largest_distance"] > 0:
         raise ValueError("radial_input or largest_distance has no allowed value")
+    neighbours = header["neighbours"]
+    if not (isinstance(neighbours, int) and 1 <= neighbours <= MOST_NEIGHBOURS):
+        raise ValueError(f"neighbours is {neighbours!r}, not a number up to {MOST_NEIGHBOURS}")
 
     def tensor(name, *shape):
         array = tensors[f"{component}.{name}"]
@@ -227,7 +236,7 @@ def _network(tensors, header, component):
             raise ValueError(f"{component}.{name} holds a value that is not finite")
         return array
 
-    widths = block_widths(header["kind"], header["layers"][component], component)
+    widths = block_widths(header["kind"], header["layers"][component], component, neighbours)
     blocks = []
     for number, row in enumerate(widths):
         layers = []
@@ -241,11 +250,12 @@ def _network(tensors, header, component):
     features = INPUTS[layout.unit_vectors]
     mean, scale = tensor("mean", features), tensor("scale", features)
     unit = float(tensor("unit", 1)[0])
-    return Network(component, USES[layout.blocks], blocks, mean, scale, unit)
+    uses = block_uses(layout.blocks, neighbours)
+    return Network(component, uses, blocks, mean, scale, unit)
 
 
-def _checksum(tensors):
-    digest = hashlib.sha256()
+def _checksum(header, tensors):
+    digest = hashlib.sha256(json.dumps(header, sort_keys=True).encode())
     for name in sorted(tensors):
         digest.update(f"{name} {tensors[name].dtype} {tensors[name].shape}".encode())
         digest.update(tensors[name].tobytes())

@@ -78,10 +78,10 @@ def export_vtkhdf(
                     progress(k + 1, frames)
 
 
-def _folded(position, side):
+def _folded(position, box_length):
     """Positions within the cube; one that rounding puts on the far face belongs on the near one."""
-    folded = (position - side * np.floor(position / side)).astype(position.dtype)
-    return np.where(folded < side.astype(position.dtype), folded, 0)
+    folded = (position - box_length * np.floor(position / box_length)).astype(position.dtype)
+    return np.where(folded < box_length.astype(position.dtype), folded, 0)
 
 
 def _like(group, name, variable, rows):

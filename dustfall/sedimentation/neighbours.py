@@ -1,4 +1,4 @@
-"""The five nearest neighbours of every particle in a periodic cube.
+"""The nearest neighbours of every particle in a periodic cube.
 
 What the search returns hangs on the positions alone: distances are those between nearest images,
 computed in one way everywhere, and where two are equal the particle with the lower row comes first.
@@ -7,60 +7,64 @@ computed in one way everywhere, and where two are equal the particle with the lo
 import numpy as np
 from numba import njit
 
-from dustfall.forces.frames import NEIGHBOURS
 from dustfall.sedimentation.blocks import Blocks
+from dustfall.units import NEIGHBOURS
 
-FIRST_REACH = 1.5
-"""Radius of a search that knows nothing, in mean spacings: 14 particles are expected within."""
+EXPECTED_WITHIN = 2.8
+"""Particles that a search which knows nothing expects within its radius, for each one wanted."""
 
 GROWTH = 1.5
-"""By what a search is widened that met fewer than five particles."""
+"""By what a search is widened that met too few particles."""
 
 _ROUNDING = 1e-9  # of a cell: keeps rounding of cell faces from hiding a particle
 
 
-def nearest_neighbours(position: np.ndarray, side: float) -> tuple[np.ndarray, np.ndarray]:
-    """Find the five nearest neighbours of every particle, exactly, in a periodic cube.
+def nearest_neighbours(
+    position: np.ndarray, box_length: float, number: int = NEIGHBOURS
+) -> tuple[np.ndarray, np.ndarray]:
+    """Find the nearest neighbours of every particle, exactly, in a periodic cube.
 
     Every other particle counts once, at its nearest image. Particles are sorted into cells; a
-    search covers the cells within a radius and widens until it holds five.
+    search covers the cells within a radius and widens until it holds enough.
 
     Parameters
     ----------
     position : (n, 3), wrapped into the cube or not
-    side : of the cube, in the unit of `position`
+    box_length : side of the cube, in the unit of `position`
+    number : of neighbours, k
 
     Returns
     -------
-    vectors : (n, 5, 3) from the particle to its neighbours, nearest first
-    index : (n, 5) int32, the neighbours' rows in `position`
+    vectors : (n, k, 3) from the particle to its neighbours, nearest first
+    index : (n, k) int32, the neighbours' rows in `position`
 
     Raises
     ------
-    ValueError : fewer than six particles, wrong shape, positions not finite, `side` not positive.
+    ValueError : no more than k particles, wrong shape, positions that are not finite, a
+        `box_length` that is not positive.
     """
-    position = check_positions(position, side)
+    position = check_positions(position, box_length, number)
     n = len(position)
-    wrapped = wrap(position, side)
-    cells = sort_by_cell(wrapped, side)
-    index = np.empty((n, NEIGHBOURS), np.int32)
+    wrapped = wrap(position, box_length)
+    cells = sort_by_cell(wrapped, box_length)
+    index = np.empty((n, number), np.int32)
     with Blocks(n) as blocks:
-        blocks.run(lambda first, last: _search(first, last, wrapped, side, cells, index))
-    return separations(wrapped, index, side, np.arange(n)), index
+        blocks.run(lambda first, last: _search(first, last, wrapped, box_length, cells, index))
+    return separations(wrapped, index, box_length, np.arange(n)), index
 
 
-def check_positions(position: np.ndarray, side: float) -> np.ndarray:
+def check_positions(position: np.ndarray, box_length: float, number: int) -> np.ndarray:
     """Return `position` as contiguous float64 (n, 3), or raise ValueError by name."""
     position = np.ascontiguousarray(position, dtype=np.float64)
     if position.ndim != 2 or position.shape[1] != 3:
         raise ValueError(f"positions have shape {position.shape}: (n, 3) is needed")
-    if len(position) <= NEIGHBOURS:
+    if len(position) <= number:
         raise ValueError(
-            f"{len(position)} particles: at least {NEIGHBOURS + 1} are needed for each to have "
-            f"{NEIGHBOURS} neighbours"
+            f"{len(position)} particles: at least {number + 1} are needed for each to have "
+            f"{number} neighbours"
         )
-    if not (np.isfinite(side) and side > 0):
-        raise ValueError(f"side of the cube is {side}: it has to be positive and finite")
+    if not (np.isfinite(box_length) and box_length > 0):
+        raise ValueError(f"box_length is {box_length}: it has to be positive and finite")
     if not np.isfinite(position).all():
         row = np.flatnonzero(~np.isfinite(position).all(axis=1))[0]
         raise ValueError(f"position of particle {row} is {position[row]}: it has to be finite")
@@ -68,39 +72,39 @@ def check_positions(position: np.ndarray, side: float) -> np.ndarray:
 
 
 @njit(cache=True, nogil=True)
-def wrap(position, side):
-    """Positions (n, 3) folded into the cube, 0 <= x < side."""
+def wrap(position, box_length):
+    """Positions (n, 3) folded into the cube, 0 <= x < box_length."""
     wrapped = np.empty_like(position)
     for i in range(len(position)):
         for axis in range(3):
-            x = position[i, axis] - side * np.floor(position[i, axis] / side)
+            x = position[i, axis] - box_length * np.floor(position[i, axis] / box_length)
             # A tiny negative coordinate wraps onto the far face by rounding.
-            wrapped[i, axis] = x if x < side else 0.0
+            wrapped[i, axis] = x if x < box_length else 0.0
     return wrapped
 
 
 @njit(cache=True, nogil=True)
-def _nearest_image(difference, side):
+def _nearest_image(difference, box_length):
     """A difference of two wrapped coordinates, taken to the nearest image."""
-    if difference > 0.5 * side:
-        return difference - side
-    if difference < -0.5 * side:
-        return difference + side
+    if difference > 0.5 * box_length:
+        return difference - box_length
+    if difference < -0.5 * box_length:
+        return difference + box_length
     return difference
 
 
 @njit(cache=True, nogil=True)
-def distance2(wrapped, i, j, side):
+def distance2(wrapped, i, j, box_length):
     """Square of the distance between particles `i` and `j`: the one that all searches compare."""
-    x = _nearest_image(wrapped[j, 0] - wrapped[i, 0], side)
-    y = _nearest_image(wrapped[j, 1] - wrapped[i, 1], side)
-    z = _nearest_image(wrapped[j, 2] - wrapped[i, 2], side)
+    x = _nearest_image(wrapped[j, 0] - wrapped[i, 0], box_length)
+    y = _nearest_image(wrapped[j, 1] - wrapped[i, 1], box_length)
+    z = _nearest_image(wrapped[j, 2] - wrapped[i, 2], box_length)
     return x * x + y * y + z * z
 
 
 @njit(cache=True, nogil=True)
-def separations(wrapped, index, side, rows):
-    """Vectors (m, 5, 3) from the particles `rows` (m,) to their neighbours."""
+def separations(wrapped, index, box_length, rows):
+    """Vectors (m, k, 3) from the particles `rows` (m,) to their neighbours."""
     vectors = np.empty((len(rows), index.shape[1], 3))
     for k in range(len(rows)):
         i = rows[k]
@@ -108,12 +112,12 @@ def separations(wrapped, index, side, rows):
             j = index[i, slot]
             for axis in range(3):
                 difference = wrapped[j, axis] - wrapped[i, axis]
-                vectors[k, slot, axis] = _nearest_image(difference, side)
+                vectors[k, slot, axis] = _nearest_image(difference, box_length)
     return vectors
 
 
 @njit(cache=True, nogil=True)
-def sort_by_cell(wrapped, side):
+def sort_by_cell(wrapped, box_length):
     """Sort particles into cubic cells of one particle on average.
 
     Returns the number of cells along a side, the rows in the order of their cells, their positions
@@ -121,7 +125,7 @@ def sort_by_cell(wrapped, side):
     """
     n = len(wrapped)
     cells = max(1, int(n ** (1 / 3)))
-    scale = cells / side
+    scale = cells / box_length
     cell = np.empty(n, np.int32)
     first = np.zeros(cells**3 + 1, np.int32)
     for i in range(n):
@@ -144,13 +148,13 @@ def sort_by_cell(wrapped, side):
 
 
 @njit(cache=True, nogil=True)
-def collect(i, reach, wrapped, side, cells, met, square):
+def collect(i, reach, wrapped, box_length, cells, met, square):
     """Find all particles within `reach` of particle `i`, itself included, in no special order.
 
     Writes their rows to `met` and the squares of their distances to `square`; returns how many.
     """
     number, row, point, first = cells
-    scale = number / side
+    scale = number / box_length
     low, high = np.empty(3, np.int64), np.empty(3, np.int64)
     for axis in range(3):
         low[axis] = np.floor((wrapped[i, axis] - reach) * scale - _ROUNDING)
@@ -173,9 +177,9 @@ def collect(i, reach, wrapped, side, cells, met, square):
                 else:
                     bottom, top = 0, high[2] % number
                 for k in range(first[column + bottom], first[column + top + 1]):
-                    dx = _nearest_image(point[k, 0] - x, side)
-                    dy = _nearest_image(point[k, 1] - y, side)
-                    dz = _nearest_image(point[k, 2] - z, side)
+                    dx = _nearest_image(point[k, 0] - x, box_length)
+                    dy = _nearest_image(point[k, 1] - y, box_length)
+                    dz = _nearest_image(point[k, 2] - z, box_length)
                     met[count] = row[k]
                     square[count] = dx * dx + dy * dy + dz * dz
                     count += square[count] <= limit
@@ -208,16 +212,22 @@ def _before(square, j, other_square, other):
 
 
 @njit(cache=True, nogil=True)
-def nearest_within(i, reach, wrapped, side, cells, met, square, nearest, chosen):
-    """List the particles nearest to `i`, at least five, nearest first.
+def first_reach(box_length, particles, number):
+    """Radius of a search that knows nothing but how many particles are wanted."""
+    return box_length * (EXPECTED_WITHIN * number / (4.0 / 3.0 * np.pi * particles)) ** (1 / 3)
 
-    The list takes those within `reach`, or within a larger radius where there are fewer than five,
-    as far as there is room in `nearest` (squares of distances) and `chosen` (rows). Returns how
-    many are listed, and a distance that no particle left out is nearer than.
+
+@njit(cache=True, nogil=True)
+def nearest_within(i, number, reach, wrapped, box_length, cells, met, square, nearest, chosen):
+    """List the particles nearest to `i`, at least `number`, nearest first.
+
+    The list takes those within `reach`, or within a larger radius where there are too few, as far
+    as there is room in `nearest` (squares of distances) and `chosen` (rows). Returns how many are
+    listed, and a distance that no particle left out is nearer than.
     """
     while True:
-        found = collect(i, reach, wrapped, side, cells, met, square)
-        if found > NEIGHBOURS:
+        found = collect(i, reach, wrapped, box_length, cells, met, square)
+        if found > number:
             break
         reach *= GROWTH
     count = 0
@@ -234,11 +244,11 @@ def nearest_within(i, reach, wrapped, side, cells, met, square, nearest, chosen)
 
 
 @njit(cache=True, nogil=True)
-def _search(first, last, wrapped, side, cells, index):
-    """The five nearest of the particles at places `first` to `last - 1` of the cells' order."""
-    n = len(wrapped)
+def _search(first, last, wrapped, box_length, cells, index):
+    """The nearest of the particles at places `first` to `last - 1` of the cells' order."""
+    n, number = index.shape
     met, square = np.empty(n + 1, np.int32), np.empty(n + 1)
-    nearest = np.empty(NEIGHBOURS)
+    nearest = np.empty(number)
     for i in cells[1][first:last]:
-        reach = FIRST_REACH * side / n ** (1 / 3)
-        nearest_within(i, reach, wrapped, side, cells, met, square, nearest, index[i])
+        reach = first_reach(box_length, n, number)
+        nearest_within(i, number, reach, wrapped, box_length, cells, met, square, nearest, index[i])

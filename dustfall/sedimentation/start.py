@@ -7,7 +7,8 @@ import numpy as np
 from numba import njit
 
 from dustfall.sedimentation.neighbours import sort_by_cell
-from dustfall.units import SPHERE_VOLUME
+from dustfall.sedimentation.state import State, box_length
+from dustfall.streams import Purpose, stream
 
 SATURATION = 0.38
 """Random sequential addition of equal spheres jams near this volume fraction (0.3841)."""
@@ -16,24 +17,42 @@ DRAWS_PER_PARTICLE = 10_000
 """Draws after which a packing is given up; at a volume fraction of 0.3 about a hundred suffice."""
 
 
-def cube_side(particles: int, volume_fraction: float) -> float:
-    """Side of the cube that holds `particles` spheres at `volume_fraction`, in d_p.
+START_VELOCITY = {"rest": 0.0, "stokes": -1.0}
+"""Vertical velocity at the start [v_s]."""
 
-    L = (n V_p / phi)^(1/3) (paper, section "Mineral dust sedimentation").
 
-    Raises
-    ------
-    ValueError : fewer than six particles, or a volume fraction outside ]0, 0.38[, where random
-        sequential addition jams.
+def random_start(
+    particles: int, volume_fraction: float, seed: int, case: int = 0, velocity: str = "rest"
+) -> State:
+    """Spheres at random places without overlap, all at rest or at the Stokes velocity.
+
+    The places depend on (seed, case) alone. Raises ValueError as `random_positions` and
+    `start_from` do.
     """
-    if particles < 6:
-        raise ValueError(f"{particles} particles: at least 6 are needed, for five neighbours each")
-    if not 0 < volume_fraction < SATURATION:
-        raise ValueError(
-            f"volume fraction phi is {volume_fraction}: allowed is 0 < phi < {SATURATION}, where "
-            f"random addition without overlap jams"
-        )
-    return float((particles * SPHERE_VOLUME / volume_fraction) ** (1 / 3))
+    draws = stream(Purpose.START, seed, case)
+    return start_from(
+        random_positions(draws, particles, volume_fraction), volume_fraction, velocity
+    )
+
+
+def start_from(position, volume_fraction: float, velocity="rest") -> State:
+    """Start from given places (n, 3) [d_p] and velocities: (n, 3) [v_s], "rest" or "stokes".
+
+    Raises ValueError for another shape, a value that is not finite, or another word.
+    """
+    position = np.array(position, dtype=np.float64)
+    if isinstance(velocity, str):
+        if velocity not in START_VELOCITY:
+            raise ValueError(f"start is {velocity!r}: allowed are {', '.join(START_VELOCITY)}")
+        velocity = np.tile([0.0, 0.0, START_VELOCITY[velocity]], (len(position), 1))
+    velocity = np.array(velocity, dtype=np.float64)
+    for name, array in {"positions": position, "velocities": velocity}.items():
+        if array.shape != (len(position), 3):
+            raise ValueError(f"{name} have shape {array.shape}: ({len(position)}, 3) is needed")
+        if not np.isfinite(array).all():
+            raise ValueError(f"{name} at the start hold a value that is not finite")
+    box_length(len(position), volume_fraction)
+    return State(position, velocity, volume_fraction)
 
 
 def random_positions(rng: np.random.Generator, particles: int, volume_fraction: float):
@@ -43,16 +62,22 @@ def random_positions(rng: np.random.Generator, particles: int, volume_fraction: 
 
     Returns
     -------
-    (n, 3) positions in d_p, within the cube of side `cube_side(particles, volume_fraction)`, cell
+    (n, 3) positions in d_p, within the cube of side `box_length(particles, volume_fraction)`, cell
     by cell
 
     Raises
     ------
-    ValueError : as `cube_side`, or the spheres do not fit (phi close to jamming).
+    ValueError : the volume fraction is outside ]0, 0.38[, where random addition jams, or the
+        spheres do not fit (phi close to jamming).
     """
-    side = cube_side(particles, volume_fraction)
+    if not 0 < volume_fraction < SATURATION:
+        raise ValueError(
+            f"volume fraction phi is {volume_fraction}: allowed is 0 < phi < {SATURATION}, where "
+            f"random addition without overlap jams"
+        )
+    length = box_length(particles, volume_fraction)
     # Cells no narrower than a diameter, so that overlaps are among the 27 around a draw.
-    cells = max(1, min(int(side), int(np.ceil(particles ** (1 / 3)))))
+    cells = max(1, min(int(length), int(np.ceil(particles ** (1 / 3)))))
     position = np.empty((particles, 3))
     head = np.full(cells**3, -1, np.int64)
     following = np.full(particles, -1, np.int64)
@@ -63,10 +88,10 @@ def random_positions(rng: np.random.Generator, particles: int, volume_fraction: 
                 f"{particles} spheres do not fit at volume fraction phi = {volume_fraction}: "
                 f"{placed} were placed in {draws} random draws; choose a smaller phi"
             )
-        draw = rng.random((particles, 3)) * side
-        placed = _add(draw, position, placed, head, following, side, cells)
+        draw = rng.random((particles, 3)) * length
+        placed = _add(draw, position, placed, head, following, length, cells)
         draws += particles
-    return position[sort_by_cell(position, side)[1]]
+    return position[sort_by_cell(position, length)[1]]
 
 
 def read_start(path: str | Path, particles: int, volume_fraction: float):
@@ -89,12 +114,12 @@ def read_start(path: str | Path, particles: int, volume_fraction: float):
     path = Path(path)
     if path.suffix == ".nc":
         with netCDF4.Dataset(path) as file:
-            side = cube_side(particles, volume_fraction)
+            length = box_length(particles, volume_fraction)
             lengths = _last_frame(path, file, "cell_lengths", "d_p")
-            if lengths is not None and not np.allclose(lengths, side, rtol=1e-6):
+            if lengths is not None and not np.allclose(lengths, length, rtol=1e-6):
                 raise ValueError(
                     f"{path} has a cell of {lengths} d_p: {particles} particles at volume fraction "
-                    f"phi = {volume_fraction:g} fill a cube of {side:.6g} d_p"
+                    f"phi = {volume_fraction:g} fill a cube of {length:.6g} d_p"
                 )
             positions = _last_frame(path, file, "coordinates", "d_p")
             velocities = _last_frame(path, file, "velocities", "v_s")
@@ -123,7 +148,7 @@ def _last_frame(path, file, name, units):
 
 
 @njit(cache=True)
-def _add(draw, position, placed, head, following, side, cells):
+def _add(draw, position, placed, head, following, length, cells):
     """Add the draws that overlap with nothing; `head` and `following` list a cell's spheres."""
     reach = min(1, cells // 2)
     for k in range(len(draw)):
@@ -131,7 +156,7 @@ def _add(draw, position, placed, head, following, side, cells):
             break
         cell = np.empty(3, np.int64)
         for axis in range(3):
-            cell[axis] = min(int(draw[k, axis] / side * cells), cells - 1)
+            cell[axis] = min(int(draw[k, axis] / length * cells), cells - 1)
         free = True
         for dx in range(cell[0] - reach, cell[0] + reach + 1):
             for dy in range(cell[1] - reach, cell[1] + reach + 1):
@@ -142,7 +167,7 @@ def _add(draw, position, placed, head, following, side, cells):
                         d2 = 0.0
                         for axis in range(3):
                             x = draw[k, axis] - position[j, axis]
-                            x -= side * np.rint(x / side)
+                            x -= length * np.rint(x / length)
                             d2 += x * x
                         free = d2 >= 1.0
                         j = following[j]

@@ -1,51 +1,38 @@
 """What a run leaves behind: its trajectory, its series, and the records they are made from."""
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 import netCDF4
 import numpy as np
 
 from dustfall import __version__
+from dustfall.columns import Column
 from dustfall.files import atomic
 
 TRACKED = 3
 """Particles whose position, velocity and force the series holds at every step."""
 
-SERIES = np.dtype(
-    [
-        ("time", "f8"),
-        ("settling_velocity_mean", "f8"),
-        ("settling_velocity_variance", "f8"),
-        ("inverse_beta_mean", "f8"),
-        ("beta_mean", "f8"),
-        ("drag_mean", "f8"),
-        ("new_neighbours", "f8"),
-        ("only_fifth", "f8"),
-        ("overlaps", "i8"),
-        ("below_contact", "i8"),
-        ("tracked_position", "f8", (TRACKED, 3)),
-        ("tracked_velocity", "f8", (TRACKED, 3)),
-        ("tracked_force", "f8", (TRACKED, 3)),
-    ]
-)
+VECTORS = ("tracked_position", "tracked_velocity", "tracked_force")
 
-SERIES_MEANING = {
-    "time": ("tau", "time since the start"),
-    "settling_velocity_mean": ("v_s", "mean downward velocity of the particles"),
-    "settling_velocity_variance": ("v_s^2", "variance of the downward velocity over particles"),
-    "inverse_beta_mean": ("1", "mean over particles of 1/beta, beta = F'_y / 24"),
-    "beta_mean": ("1", "mean over particles of beta = F'_y / 24"),
-    "drag_mean": ("1", "mean upward drag over weight minus buoyancy: one in the steady state"),
-    "new_neighbours": ("1", "fraction of particles with another set of five than a step ago"),
-    "only_fifth": ("1", "fraction of these whose fifth neighbour alone changed"),
-    "overlaps": ("1", "pairs of neighbours with centres closer than a diameter"),
-    "below_contact": ("1", "neighbours that the force model sees closer than contact"),
-    "tracked_position": ("d_p", "unwrapped position of tracked particles, z upwards"),
-    "tracked_velocity": ("v_s", "velocity of tracked particles, z upwards"),
-    "tracked_force": ("1", "drag on tracked particles over weight minus buoyancy, z upwards"),
+SERIES = {
+    "time": Column("tau", "time since the start"),
+    "settling_velocity_mean": Column("v_s", "mean downward velocity of the particles"),
+    "settling_velocity_variance": Column(
+        "v_s^2", "variance of the downward velocity over particles"
+    ),
+    "drag_mean": Column("1", "mean upward drag over weight less buoyancy: one when steady"),
+    "tracked_position": Column("d_p", "unwrapped position of tracked particles, z upwards"),
+    "tracked_velocity": Column("v_s", "velocity of tracked particles, z upwards"),
+    "tracked_force": Column("1", "drag on tracked particles over weight less buoyancy, z upwards"),
 }
+"""What the series of any run holds at each step; its closure adds its own."""
+
+
+def series_type(columns: Iterable[str]) -> np.dtype:
+    """Record of one step of a series with these columns."""
+    return np.dtype([(name, "f8", (TRACKED, 3) if name in VECTORS else ()) for name in columns])
 
 
 def frame_type(particles: int, precision: str) -> np.dtype:
@@ -111,7 +98,7 @@ class Records:
         self.path.unlink()
 
 
-def write_trajectory(path: Path, frames: Records, side: float, attributes: Mapping) -> None:
+def write_trajectory(path: Path, frames: Records, box_length: float, attributes: Mapping) -> None:
     """Write frames as NetCDF-4 in the AMBER convention, which OVITO and xarray open.
 
     Coordinates are unwrapped; `cell_lengths` folds them back into the cube. Lengths are in d_p,
@@ -171,16 +158,23 @@ def write_trajectory(path: Path, frames: Records, side: float, attributes: Mappi
             )
         for k, frame in enumerate(frames):
             time[k] = frame["time"]
-            lengths[k] = side
+            lengths[k] = box_length
             angles[k] = 90.0
             for name, column in columns.items():
                 column[k] = frame[name]
 
 
-def write_series(path: Path, series: Records, tracked: np.ndarray, attributes: Mapping) -> None:
+def write_series(
+    path: Path,
+    series: Records,
+    columns: Mapping[str, Column],
+    tracked: np.ndarray,
+    attributes: Mapping,
+) -> None:
     """Write the series of a run as NetCDF-4 with dimensions step, tracked and spatial.
 
-    `tracked` (3,) are the rows of the tracked particles in the trajectory.
+    `tracked` (3,) are the rows of the tracked particles in the trajectory; `columns` tells what
+    each column holds.
     """
     with atomic(path) as temporary, netCDF4.Dataset(temporary, "w", format="NETCDF4") as file:
         file.setncatts({"title": "Sedimentation in a periodic cube, every step", **attributes})
@@ -189,8 +183,8 @@ def write_series(path: Path, series: Records, tracked: np.ndarray, attributes: M
         file.createVariable("spatial", "S1", ("spatial",))[:] = np.array(list("xyz"), "S1")
         file.createVariable("tracked", "i8", ("tracked",))[:] = tracked
         file["tracked"].long_name = "row of the particle in the trajectory"
-        rows = np.fromiter(series, SERIES, series.count)
-        for name, (units, meaning) in SERIES_MEANING.items():
+        rows = np.fromiter(series, series.record, series.count)
+        for name, (units, meaning) in columns.items():
             dimensions = ("step", "tracked", "spatial")[: rows[name].ndim]
             column = file.createVariable(name, rows[name].dtype, dimensions)
             column.units = units

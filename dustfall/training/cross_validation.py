@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from dustfall.forces.features import COMPONENTS
 from dustfall.forces.learned import parse_layers
+from dustfall.streams import Purpose, stream
 from dustfall.training.fit import (
     SETTINGS,
     TrainingSettings,
@@ -12,8 +12,7 @@ from dustfall.training.fit import (
     train_networks,
     training_scenes,
 )
-
-_FOLDS = 3  # first integer of the random stream that deals samples to folds
+from dustfall.units import COMPONENTS
 
 
 def cross_validate(
@@ -31,11 +30,11 @@ def cross_validate(
 ) -> dict:
     """Train a layer configuration once a fold, each time validated on the fold left out.
 
-    Parameters: `neighbours` (m, 5, 3) in d_p, `force` (m, 3) in Re_p c_D, `component` streamwise
+    Parameters: `neighbours` (m, k, 3) in d_p, `force` (m, 3) in Re_p c_D, `component` streamwise
     or lateral, the rest as in `training.train_model`. Returns plain values for a JSON file:
     component, kind, layers, parameters (their number), and `folds`, a list with fold, mse
     [(Re_p c_D)^2], r2 and epochs (of the weights kept). As in the paper the fold that scores also
-    picks the epoch. A fold hangs on (seed, component, fold) alone: it has the same bits in any
+    picks the epoch. A fold depends on (seed, component, fold) alone: it has the same bits in any
     sweep. `progress(done, total)` counts epochs.
 
     Raises ValueError for arguments out of range.
@@ -47,19 +46,19 @@ def cross_validate(
     if not isinstance(folds, int) or folds < 2:
         raise ValueError(f"folds is {folds!r}; it must be an integer >= 2")
     neighbours, force = check_samples(neighbours, force, 2 * folds)
-    scenes, _ = training_scenes(kind, neighbours, radial_input, seed)
-    dealt = np.random.default_rng([seed, _FOLDS]).permutation(len(neighbours)) % folds
+    scenes, _ = training_scenes(kind, neighbours, radial_input)
+    dealt = stream(Purpose.FOLDS, seed).permutation(len(neighbours)) % folds
     splits = [
         (np.flatnonzero(dealt != fold), np.flatnonzero(dealt == fold)) for fold in range(folds)
     ]
-    trials = [[seed, fold + 1] for fold in range(folds)]
+    numbers = [fold + 1 for fold in range(folds)]
 
     def report(epoch):
         if progress:
             progress(epoch, settings.epochs)
 
     trained = train_networks(
-        kind, scenes, force, component, layers, splits, settings, trials, report, device
+        kind, scenes, force, component, layers, splits, settings, seed, numbers, report, device
     )
     if progress:
         progress(settings.epochs, settings.epochs)

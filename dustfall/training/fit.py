@@ -10,16 +10,15 @@ import torch
 from torch import nn
 
 from dustfall import __version__
-from dustfall.forces.features import COMPONENTS, KINDS, RADIAL_INPUTS, USES, Scenes, describe
-from dustfall.forces.frames import NEIGHBOURS, check_neighbours
+from dustfall.forces.features import KINDS, RADIAL_INPUTS, Scenes, block_uses, describe
+from dustfall.forces.frames import check_neighbours
 from dustfall.forces.learned import FORMAT, VERSION, LearnedModel, Network, parse_layers
+from dustfall.streams import Purpose, sequence, stream
 from dustfall.training.networks import Affine, build
+from dustfall.units import COMPONENTS
 
 VALIDATION_SHARE = 0.1
 """Share of the samples kept for validation (paper, section "Deterministic model")."""
-
-# First integers of the random streams, so that no two purposes share one.
-_SPLIT, _ORDER, _TRIAL = range(3)
 
 
 @dataclass(frozen=True)
@@ -59,7 +58,7 @@ class TrainingSettings:
 
 SETTINGS = {
     kind: TrainingSettings()
-    if layout.baseline == "stokes"
+    if layout.baseline == "isolated"
     else TrainingSettings(batch_size=256, epochs=100, learning_rate=3e-3)
     for kind, layout in KINDS.items()
 }
@@ -103,7 +102,7 @@ def fit(
 ) -> list[History]:
     """Train k networks side by side, in place, and leave each at its best validation error.
 
-    `tensors` are the normalised inputs (k, m, 5, F), envelope (k, m, uses) and target
+    `tensors` are the normalised inputs (k, m, neighbours, F), envelope (k, m, uses) and target
     (k, m, 1 or 2); `splits` are each network's training and validation rows, `generators` shuffle
     them. In an epoch all take as many steps as the smallest training set gives. `report(epoch)` is
     called after each epoch. Returns the histories, in the target's unit. Raises FloatingPointError
@@ -186,7 +185,7 @@ def train_model(
 ) -> LearnedModel:
     """Train both components of a force model.
 
-    Parameters: `kind` one of `KINDS`; `neighbours` (m, 5, 3) in d_p; `force` (m, 3) in
+    Parameters: `kind` one of `KINDS`; `neighbours` (m, k, 3) in d_p; `force` (m, 3) in
     Re_p c_D; `layers` hidden widths as in "40-40/30-30-30" (dense and pairwise: one block);
     `settings` by default those of `SETTINGS`; `radial_input` what the spherical coordinates give
     for the distance, "distance" or "logarithm" (unit vectors come with 1/r and log r). One sample
@@ -199,8 +198,8 @@ def train_model(
     parse_layers(layers, kind)
     settings = settings or SETTINGS[kind]
     neighbours, force = check_samples(neighbours, force, 10)
-    scenes, largest = training_scenes(kind, neighbours, radial_input, seed)
-    shuffled = np.random.default_rng([seed, _SPLIT]).permutation(len(neighbours))
+    scenes, largest = training_scenes(kind, neighbours, radial_input)
+    shuffled = stream(Purpose.VALIDATION, seed).permutation(len(neighbours))
     kept = max(1, round(VALIDATION_SHARE * len(neighbours)))
     validation, training = np.sort(shuffled[:kept]), np.sort(shuffled[kept:])
     networks, history, scores = {}, {}, {}
@@ -212,7 +211,7 @@ def train_model(
 
         split = [(training, validation)]
         ((networks[component], history[component]),) = train_networks(
-            kind, scenes, force, component, layers, split, settings, [[seed]], report, device
+            kind, scenes, force, component, layers, split, settings, seed, [0], report, device
         )
         scores[component] = score(networks[component], scenes, force, component, validation)
     if progress:
@@ -222,6 +221,7 @@ def train_model(
         "format": FORMAT,
         "version": VERSION,
         "kind": kind,
+        "neighbours": neighbours.shape[1],
         "layers": dict.fromkeys(COMPONENTS, layers),
         "radial_input": radial_input,
         "largest_distance": largest,
@@ -253,22 +253,22 @@ def train_networks(
     layers: str,
     splits: list[tuple[np.ndarray, np.ndarray]],
     settings: TrainingSettings,
-    trials: list[list[int]],
+    seed: int,
+    folds: list[int],
     report=None,
     device: str = "cpu",
 ) -> list[tuple[Network, History]]:
     """Train a network of one component on each split; return them with their histories.
 
-    A split is the rows to train on and those to validate with. Initial weights and batches of a
-    network hang on its trial (integers) and the component alone.
+    A split is the rows to train on and those to validate with; `folds` numbers them, 0 for the
+    one of a final model. Initial weights and batches of a network depend on the seed, its number
+    and the component alone.
     """
     if device != "cpu" and not torch.cuda.is_available():
         raise ValueError(f"device is {device!r}, but PyTorch finds no GPU here; use 'cpu'")
-    generators = [
-        _generator([*trial, _TRIAL, list(COMPONENTS).index(component)]) for trial in trials
-    ]
+    generators = [_generator(seed, fold, list(COMPONENTS).index(component)) for fold in folds]
     target = scenes.residual(force, component)
-    features = scenes.inputs.shape[2]
+    neighbours, features = scenes.inputs.shape[1:]
     # Training rows alone set the normalisation; validation rows must not leak into it.
     units = [float(np.sqrt(np.mean(target[rows] ** 2))) or 1.0 for rows, _ in splits]
     seen = [scenes.inputs[rows].reshape(-1, features) for rows, _ in splits]
@@ -281,7 +281,7 @@ def train_networks(
         for arrays in (normal, [scenes.envelope] * len(splits), [target / unit for unit in units])
     ]
     with one_thread():
-        networks = build(kind, layers, component, generators).to(device)
+        networks = build(kind, layers, component, neighbours, generators).to(device)
         histories = fit(networks, tensors, splits, settings, generators, report)
     trained = []
     for k, (mean, scale, unit, history) in enumerate(
@@ -292,13 +292,14 @@ def train_networks(
             for block in networks.blocks
         ]
         errors = [error * unit**2 for error in history.validation_error]
-        network = Network(component, USES[KINDS[kind].blocks], blocks, mean, scale, unit)
+        uses = block_uses(KINDS[kind].blocks, neighbours)
+        network = Network(component, uses, blocks, mean, scale, unit)
         trained.append((network, History(history.epochs, errors)))
     return trained
 
 
-def _generator(entropy: list[int]) -> torch.Generator:
-    (state,) = np.random.SeedSequence(entropy).generate_state(1, np.uint64)
+def _generator(seed: int, *items: int) -> torch.Generator:
+    (state,) = sequence(Purpose.NETWORK, seed, *items).generate_state(1, np.uint64)
     return torch.Generator().manual_seed(int(state))
 
 
@@ -317,7 +318,7 @@ def score(
 
 
 def check_samples(neighbours, force, fewest: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return neighbours (m, 5, 3) and force (m, 3) as float64, or raise ValueError."""
+    """Return neighbours (m, k, 3) and force (m, 3) as float64, or raise ValueError."""
     neighbours = check_neighbours(neighbours)
     force = np.ascontiguousarray(force, dtype=float)
     if force.shape != (len(neighbours), 3):
@@ -329,19 +330,10 @@ def check_samples(neighbours, force, fewest: int) -> tuple[np.ndarray, np.ndarra
     return neighbours, force
 
 
-def training_scenes(
-    kind: str, neighbours: np.ndarray, radial_input: str, seed: int
-) -> tuple[Scenes, float]:
-    """Return the scenes as networks of `kind` take them, and the largest distance among them.
-
-    A kind that does not sort gets the neighbours of each scene in an order drawn from the seed:
-    records hold them sorted, which would give away the order.
-    """
+def training_scenes(kind: str, neighbours: np.ndarray, radial_input: str) -> tuple[Scenes, float]:
+    """Return the scenes as networks of `kind` take them, and the largest distance among them."""
     if radial_input not in RADIAL_INPUTS:
         raise ValueError(f"radial_input is {radial_input!r}; it must be in {RADIAL_INPUTS}")
-    if not KINDS[kind].ordered:
-        draws = np.random.default_rng([seed, _ORDER]).random((len(neighbours), NEIGHBOURS))
-        neighbours = np.take_along_axis(neighbours, draws.argsort(axis=1)[:, :, None], axis=1)
     largest = float(np.linalg.norm(neighbours, axis=2).max())
     return describe(kind, neighbours, radial_input, largest), largest
 

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import nn
 
-from dustfall.forces.features import KINDS, USES
+from dustfall.forces.features import KINDS, block_uses
 from dustfall.forces.learned import ACTIVATION, block_widths
 
 
@@ -52,7 +52,7 @@ class Block(nn.Sequential):
 
 
 class BlockSum(nn.Module):
-    """Sum of the blocks' outputs over their uses (a value of `features.USES`), each weighted."""
+    """Sum of the blocks' outputs over their uses (see `features.block_uses`), each weighted."""
 
     def __init__(self, blocks: list[Block], uses):
         super().__init__()
@@ -65,7 +65,7 @@ class BlockSum(nn.Module):
             self.pieces.append((slice(rows[0], rows[-1] + 1), slice(first, end)))
 
     def forward(self, inputs: torch.Tensor, envelope: torch.Tensor) -> torch.Tensor:
-        """Map normalised inputs (k, b, 5, F) and envelope (k, b, uses) to (k, b, 1 or 2)."""
+        """Map inputs (k, b, neighbours, F), normalised, and envelope (k, b, uses) to outputs."""
         k, b = inputs.shape[:2]
         total = 0.0
         for (rows, neighbours), block in zip(self.pieces, self.blocks, strict=True):
@@ -76,10 +76,12 @@ class BlockSum(nn.Module):
         return total
 
 
-def build(kind: str, layers: str, component: str, generators: list[torch.Generator]) -> nn.Module:
+def build(
+    kind: str, layers: str, component: str, neighbours: int, generators: list[torch.Generator]
+) -> nn.Module:
     """Return networks of one component with random weights, one drawn from each generator."""
     blocks = [
         Block(widths, ACTIVATION[component], generators)
-        for widths in block_widths(kind, layers, component)
+        for widths in block_widths(kind, layers, component, neighbours)
     ]
-    return BlockSum(blocks, USES[KINDS[kind].blocks])
+    return BlockSum(blocks, block_uses(KINDS[kind].blocks, neighbours))

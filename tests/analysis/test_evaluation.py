@@ -8,7 +8,9 @@ from dustfall.analysis.evaluation import (
     symmetry_violations,
 )
 from dustfall.dataset import Dataset
-from dustfall.forces.rotne_prager import IsolatedStokes, RotnePrager, Stokeslets
+from dustfall.forces.formulas.isolated import MODEL as ISOLATED
+from dustfall.forces.formulas.rotne_prager import MODEL as ROTNE_PRAGER
+from dustfall.forces.formulas.stokeslets import MODEL as STOKESLETS
 from dustfall.scenes import random_scenes
 
 
@@ -17,7 +19,7 @@ def test_scenes():
     parts = []
     for law in ("uniform", "ball"):
         neighbours, phi = random_scenes(4, law, range(60), (1e-7, 1e-4))
-        force = RotnePrager().predict(neighbours)
+        force = ROTNE_PRAGER.predict(neighbours)
         parts.append(Dataset(neighbours, force, phi, np.full(60, law), np.arange(60)))
     names = ("neighbours", "force", "volume_fraction", "radial_law", "scene")
     return Dataset(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
@@ -68,7 +70,13 @@ class PolarBias:
 
 def test_symmetries_are_broken_by_just_those_models_that_break_them(test_scenes):
     neighbours = test_scenes.neighbours
-    models = [IsolatedStokes(), Stokeslets(), RotnePrager(), SidewaysDrift(), PolarBias()]
+    models = [
+        ISOLATED,
+        STOKESLETS,
+        ROTNE_PRAGER,
+        SidewaysDrift(),
+        PolarBias(),
+    ]
     table = symmetry_violations(models, neighbours).set_index(["model", "symmetry"])["largest"]
     for name in ("isolated", "stokeslets", "rotne_prager"):
         assert (table[name] < 1e-12).all()
@@ -79,4 +87,4 @@ def test_symmetries_are_broken_by_just_those_models_that_break_them(test_scenes)
 
 
 def test_cost_counts_microseconds_a_scene(test_scenes):
-    assert 0 < prediction_cost(IsolatedStokes(), test_scenes.neighbours, 2) < 1e6
+    assert 0 < prediction_cost(ISOLATED, test_scenes.neighbours, 2) < 1e6

@@ -9,11 +9,12 @@ from dustfall.analysis.frozen_cloud import (
     five_neighbour_drag,
     frozen_cloud_table,
 )
-from dustfall.sedimentation.start import cube_side, random_positions
+from dustfall.sedimentation.start import random_positions
+from dustfall.sedimentation.state import box_length
 
 
 def cloud(phi, seed, n=150):
-    return random_positions(np.random.default_rng(seed), n, phi), cube_side(n, phi)
+    return random_positions(np.random.default_rng(seed), n, phi), box_length(n, phi)
 
 
 def test_five_nearest_are_the_closure():

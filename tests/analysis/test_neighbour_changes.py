@@ -13,7 +13,7 @@ def run(changes, fifth, seed=1):
         {
             "time": ("step", 0.1 * np.arange(len(changes))),
             "new_neighbours": ("step", changes),
-            "only_fifth": ("step", fifth),
+            "only_farthest": ("step", fifth),
         },
         attrs=attrs | {"seed": seed},
     )
@@ -26,7 +26,7 @@ def test_shares_are_of_particles_and_of_changes():
     (row,) = neighbour_changes([run(changes, fifth)], 0.0).to_dict("records")
     assert row["share"] == pytest.approx(0.4 / 3)
     assert row["per_tau"] == pytest.approx(4 / 3)
-    assert row["only_fifth"] == pytest.approx((0.1 * 0.5 + 0.3 * 0.9) / 0.4)
+    assert row["only_farthest"] == pytest.approx((0.1 * 0.5 + 0.3 * 0.9) / 0.4)
     assert row["low"] < row["share"] < row["high"]
 
 
@@ -36,6 +36,6 @@ def test_seeds_of_a_case_share_a_row_and_a_still_cloud_has_no_changes_to_share()
     assert row["share"] == pytest.approx(0.15)
     (still,) = neighbour_changes([run(np.zeros(40), np.full(40, np.nan))], 0.0).to_dict("records")
     assert still["share"] == 0
-    assert np.isnan(still["only_fifth"])
+    assert np.isnan(still["only_farthest"])
     with pytest.raises(ValueError, match="at least one"):
         neighbour_changes([], 0.0)

@@ -15,7 +15,7 @@ def series(step, error):
             "settling_velocity_mean": ("step", constant),
             "settling_velocity_variance": ("step", 0.5 * constant),
             "new_neighbours": ("step", np.where(time > 15, 0.2, 0.0)),
-            "only_fifth": ("step", np.where(time > 15, 0.75, np.nan)),
+            "only_farthest": ("step", np.where(time > 15, 0.75, np.nan)),
             "overlaps": ("step", 3 * constant),
         },
         attrs={"step": step},
@@ -29,7 +29,7 @@ def test_steps_are_compared_early_with_the_smallest_and_late_by_averages():
     np.testing.assert_allclose(table.inverse_beta_mean, [2.5, 2.51, 2.54], atol=1e-12)
     np.testing.assert_allclose(table.settling_velocity_variance, 0.5)
     np.testing.assert_allclose(table.settling_velocity_variance_half_width, 0, atol=1e-12)
-    np.testing.assert_allclose(table.only_fifth, 0.75)
+    np.testing.assert_allclose(table.only_farthest, 0.75)
     np.testing.assert_allclose(table.overlaps, 3)
 
 

@@ -11,7 +11,7 @@ from dustfall.benchmarks.solver import (
     time_against_error,
     time_against_spheres,
 )
-from dustfall.forces.rotne_prager import RotnePrager
+from dustfall.forces.formulas.rotne_prager import MODEL as ROTNE_PRAGER
 from dustfall.scenes import random_scenes
 from dustfall.stokes.elements.mesh import sphere_mesh
 from dustfall.stokes.elements.one_body import OneBody
@@ -27,7 +27,7 @@ def scenes():
 
 
 def test_the_peer_and_the_force_model_invert_the_same_mobility(scenes):
-    ours = RotnePrager().predict(scenes[:, 1:])
+    ours = ROTNE_PRAGER.predict(scenes[:, 1:])
     theirs = np.array([rotne_prager(centres)[0] for centres in scenes])
     np.testing.assert_allclose(theirs, ours, rtol=1e-10)
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dustfall.forces import Reflections
+from dustfall.forces.formulas.reflections import MODEL as REFLECTED
 
 LAYERS = {
     "dense": "24-24",
@@ -13,13 +13,13 @@ LAYERS = {
 }
 
 
-def random_neighbours(number, seed=0, nearest=1.0, farthest=397.0):
+def random_neighbours(scenes, seed=0, nearest=1.0, farthest=397.0, number=5):
     """Isotropic directions; log-uniform size of the scene, distances uniform within it."""
     rng = np.random.default_rng(seed)
-    direction = rng.normal(size=(number, 5, 3))
+    direction = rng.normal(size=(scenes, number, 3))
     direction /= np.linalg.norm(direction, axis=2, keepdims=True)
-    size = np.exp(rng.uniform(np.log(8.0), np.log(farthest), (number, 1)))
-    distance = rng.uniform(nearest, size, (number, 5))
+    size = np.exp(rng.uniform(np.log(8.0), np.log(farthest), (scenes, 1)))
+    distance = rng.uniform(nearest, size, (scenes, number))
     return distance[:, :, None] * direction
 
 
@@ -31,4 +31,4 @@ def corrected_forces(neighbours):
     """
     distance = np.linalg.norm(neighbours, axis=2, keepdims=True)
     correction = (neighbours[:, :, 1:2] * neighbours / distance**6).sum(axis=1)
-    return Reflections().predict(neighbours) - 4.0 * correction
+    return REFLECTED.predict(neighbours) - 4.0 * correction

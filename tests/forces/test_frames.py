@@ -139,7 +139,9 @@ def test_lateral_force_goes_to_the_canonical_frame_and_back():
     ("neighbours", "message"),
     [
         (np.ones((5, 3)), r"shape \(5, 3\)"),
-        (np.ones((2, 4, 3)), r"shape \(2, 4, 3\)"),
+        (np.ones((2, 5, 2)), r"shape \(2, 5, 2\)"),
+        (np.ones((2, 0, 3)), r"shape \(2, 0, 3\).*k from 1 to 50"),
+        (np.ones((2, 51, 3)), r"shape \(2, 51, 3\).*k from 1 to 50"),
         (np.full((2, 5, 3), np.nan), "scene 0 .* not finite"),
         (np.full((2, 5, 3), np.inf), "not finite"),
         (np.zeros((1, 5, 3)), "centre of the reference sphere"),

@@ -8,9 +8,12 @@ import torch
 from safetensors import safe_open
 from safetensors.numpy import save_file
 
-from dustfall.forces import RotnePrager, load_model
+from dustfall.forces import learned, load_model
 from dustfall.forces.features import COMPONENTS, describe
+from dustfall.forces.formulas.reflections import MODEL as REFLECTED
+from dustfall.forces.formulas.rotne_prager import MODEL as ROTNE_PRAGER
 from dustfall.forces.learned import VERSION, multiplications, parse_layers
+from dustfall.training import TrainingSettings, train_model
 from dustfall.training.networks import build
 from tests.forces.scenes import LAYERS, random_neighbours
 
@@ -24,7 +27,9 @@ def test_compiled_network_equals_pytorch(models, kind):
     neighbours = random_neighbours(333, seed=5)
     scenes = describe(kind, neighbours, header["radial_input"], header["largest_distance"])
     for component, network in model.networks.items():
-        module = build(kind, header["layers"][component], component, [torch.Generator()]).double()
+        module = build(
+            kind, header["layers"][component], component, 5, [torch.Generator()]
+        ).double()
         weights = [array for block in network.blocks for layer in block for array in layer]
         with torch.no_grad():
             for parameter, array in zip(module.parameters(), weights, strict=True):
@@ -34,6 +39,27 @@ def test_compiled_network_equals_pytorch(models, kind):
             expected = network.unit * output[0].numpy()
         compiled = network.residual(scenes.inputs, scenes.envelope)
         np.testing.assert_allclose(compiled, expected, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize(("kind", "number"), [("pairwise", 1), ("idnn", 3), ("anchored", 8)])
+def test_models_of_another_number_of_neighbours_are_trained_saved_and_held_to_it(
+    tmp_path, kind, number
+):
+    neighbours = random_neighbours(60, number=number)
+    force = REFLECTED.predict(neighbours)
+    layers = "6/4" if kind != "pairwise" else "6"
+    model = train_model(kind, neighbours, force, layers, TrainingSettings(epochs=1))
+    model.save(tmp_path / "model.safetensors")
+    loaded = load_model(tmp_path / "model.safetensors")
+    assert loaded.neighbours == number
+    np.testing.assert_array_equal(loaded.predict(neighbours), model.predict(neighbours))
+    with pytest.raises(ValueError, match=f"k = {number}"):
+        loaded.predict(random_neighbours(4, number=number + 1))
+
+
+def test_a_decomposed_network_refuses_too_few_neighbours():
+    with pytest.raises(ValueError, match="2 neighbours: a decomposed network needs at least 3"):
+        train_model("idnn", random_neighbours(20, number=2), np.ones((20, 3)), "6/4")
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -103,7 +129,7 @@ def test_force_goes_over_into_stokes_drag_beyond_the_trained_range(models, kind)
 
 def test_residual_of_the_anchored_model_fades_far_away(models):
     neighbours = random_neighbours(20)
-    difference = models["anchored"].predict(1e5 * neighbours) - RotnePrager().predict(
+    difference = models["anchored"].predict(1e5 * neighbours) - ROTNE_PRAGER.predict(
         1e5 * neighbours
     )
     assert np.abs(difference).max() < 1e-4
@@ -137,7 +163,9 @@ def rewritten(path, change):
     with safe_open(path, framework="numpy") as file:
         header = json.loads(file.metadata()["header"])
         tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+    header.pop("checksum")
     change(header, tensors)
+    header["checksum"] = learned._checksum(header, tensors)
     save_file(tensors, path, {"header": json.dumps(header)})
 
 
@@ -147,7 +175,10 @@ def test_damaged_files_are_refused(models, tmp_path):
     whole = path.read_bytes()
     flipped = bytearray(whole)
     flipped[-100] ^= 1
-    for damaged in (whole[:-10], whole[:20], b"", b"no model at all", bytes(flipped)):
+    # One digit of the header, which is as good a number as before.
+    other = whole.replace(b'largest_distance\\": 3', b'largest_distance\\": 4')
+    assert other != whole
+    for damaged in (whole[:-10], whole[:20], b"", b"no model at all", bytes(flipped), other):
         path.write_bytes(damaged)
         with pytest.raises(ValueError, match="damaged"):
             load_model(path)
@@ -169,6 +200,7 @@ def test_files_of_another_layout_are_refused(models, tmp_path):
         lambda header, tensors: header.update(kind="pairs"),
         lambda header, tensors: header.pop("layers"),
         lambda header, tensors: header.update(largest_distance="far"),
+        lambda header, tensors: header.update(neighbours=0),
     ):
         models["idnn"].save(path)
         rewritten(path, change)

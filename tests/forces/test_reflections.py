@@ -1,11 +1,13 @@
 import numpy as np
 import pytest
 
-from dustfall.forces import Reflections, RotnePrager, rotne_prager_forces
-from dustfall.forces.reflections import REFLECTIONS
+from dustfall.forces.formulas.reflections import MODEL as REFLECTED
+from dustfall.forces.formulas.reflections import REFLECTIONS
+from dustfall.forces.formulas.rotne_prager import MODEL as ROTNE_PRAGER
 from dustfall.scenes import random_scenes
 from dustfall.stokes.references.exact_pairs import pair_drag
-from dustfall.suspension.six_spheres import TERMS, six_sphere_forces
+from dustfall.suspension.few_spheres import TERMS, forces_among_neighbours
+from dustfall.suspension.rotne_prager import rotne_prager_forces
 from tests.forces.scenes import random_neighbours
 
 RADIUS = 0.5
@@ -21,7 +23,7 @@ def scenes_of(*neighbours):
 def test_two_spheres_have_the_exact_force_at_every_distance(axis, which):
     distance = np.concatenate([1 + np.logspace(-6, 1, 40), [1.0, 50.0, 1e3]])
     scenes = np.concatenate([scenes_of(r * np.eye(3)[axis]) for r in distance])
-    force = Reflections().predict(scenes)
+    force = REFLECTED.predict(scenes)
     np.testing.assert_allclose(force[:, 1] / 24, pair_drag(distance)[which], rtol=0, atol=1e-6)
     np.testing.assert_allclose(force[:, [0, 2]], 0, atol=1e-7)
 
@@ -40,15 +42,15 @@ CHAIN_END, CHAIN_MIDDLE, TRIANGLE = 0.646844, 0.442714, 0.662821
     ],
 )
 def test_three_spheres_are_within_two_per_cent_of_their_deviation_from_stokes(neighbours, expected):
-    force = Reflections().predict(scenes_of(*neighbours))[0, 1] / 24
-    formula = RotnePrager().predict(scenes_of(*neighbours))[0, 1] / 24
+    force = REFLECTED.predict(scenes_of(*neighbours))[0, 1] / 24
+    formula = ROTNE_PRAGER.predict(scenes_of(*neighbours))[0, 1] / 24
     assert abs(force - expected) < 0.02 * (1 - expected)
     assert abs(force - expected) < 0.5 * abs(formula - expected)
 
 
 def test_compiled_reflections_equal_the_formula_with_differentiated_velocity_fields():
     neighbours, _ = random_scenes(3, "uniform", range(4), (5e-3, 5e-3))
-    compiled = six_sphere_forces(neighbours, REFLECTIONS, np.zeros((2, TERMS)))
+    compiled = forces_among_neighbours(neighbours, REFLECTIONS, np.zeros((2, TERMS)))
     plain = [reflected(np.vstack([np.zeros(3), scene]))[0] for scene in neighbours]
     np.testing.assert_allclose(compiled, plain, rtol=1e-7, atol=1e-7)
 
@@ -104,7 +106,7 @@ def derivative(r, laplacians, step=1e-4):
 def test_without_reflections_the_rotne_prager_inverse_is_left():
     neighbours = random_neighbours(9, farthest=20.0)
     plain = [rotne_prager_forces(np.vstack([np.zeros(3), scene]))[0] for scene in neighbours]
-    compiled = six_sphere_forces(neighbours, 0, np.zeros((2, TERMS)))
+    compiled = forces_among_neighbours(neighbours, 0, np.zeros((2, TERMS)))
     np.testing.assert_allclose(compiled, plain, rtol=1e-11, atol=1e-11)
 
 
@@ -114,14 +116,14 @@ def test_force_keeps_the_symmetries_of_stokes_flow(overlap):
     if overlap:  # of neighbours with each other, and with the reference sphere
         neighbours[:, 1] = neighbours[:, 0] + 0.05 * neighbours[:, 2]
         neighbours[:20, 3] *= 0.02
-    force = Reflections().predict(neighbours)
+    force = REFLECTED.predict(neighbours)
     c, s = np.cos(0.7), np.sin(0.7)
     turn = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
-    turned = Reflections().predict(neighbours @ turn.T)
+    turned = REFLECTED.predict(neighbours @ turn.T)
     np.testing.assert_allclose(turned, force @ turn.T, atol=1e-11)
-    mirrored = Reflections().predict(neighbours * [-1, 1, 1])
+    mirrored = REFLECTED.predict(neighbours * [-1, 1, 1])
     np.testing.assert_allclose(mirrored, force * [-1, 1, 1], atol=1e-11)
-    np.testing.assert_allclose(Reflections().predict(-neighbours), force, atol=1e-11)
+    np.testing.assert_allclose(REFLECTED.predict(-neighbours), force, atol=1e-11)
 
 
 def test_overlapping_neighbours_keep_the_force_finite_and_below_stokes():
@@ -129,6 +131,6 @@ def test_overlapping_neighbours_keep_the_force_finite_and_below_stokes():
     neighbours[:, 1] = neighbours[:, 0]
     neighbours[:25, 1] += 0.2
     neighbours[40:] *= 1e-3
-    streamwise = Reflections().predict(neighbours)[:, 1]
+    streamwise = REFLECTED.predict(neighbours)[:, 1]
     assert (streamwise < 24).all()
     assert (streamwise > 0).all()

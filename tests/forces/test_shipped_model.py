@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from dustfall.forces import load_model
-from dustfall.forces.reflections import Reflections
-from dustfall.forces.rotne_prager import RotnePrager
+from dustfall.forces.formulas.reflections import MODEL as REFLECTED
+from dustfall.forces.formulas.rotne_prager import MODEL as ROTNE_PRAGER
 from dustfall.scenes import random_scenes
 from dustfall.stokes import forces_on_fixed_spheres
 
@@ -33,11 +33,11 @@ def test_shipped_model_keeps_its_reported_accuracy(scenes):
     assert lateral < 1e-4
 
 
-@pytest.mark.parametrize("formula", [RotnePrager, Reflections])
+@pytest.mark.parametrize("formula", [ROTNE_PRAGER, REFLECTED])
 def test_shipped_model_beats_the_formulas_that_it_stands_on(scenes, formula):
     neighbours, force = scenes
     shipped = unexplained(load_model().predict(neighbours), force)
-    formula = unexplained(formula().predict(neighbours), force)
+    formula = unexplained(formula.predict(neighbours), force)
     assert shipped[0] < 0.8 * formula[0]
     assert shipped[1] < 0.8 * formula[1]
 

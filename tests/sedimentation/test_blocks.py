@@ -1,10 +1,9 @@
 import numpy as np
 import pytest
-import xarray as xr
 
 from dustfall.forces.learned import load_model
-from dustfall.sedimentation import Properties, settle
 from dustfall.sedimentation.blocks import BLOCK, Blocks
+from tests.sedimentation.runs import run
 
 
 @pytest.mark.parametrize("particles", [1, BLOCK - 1, BLOCK, BLOCK + 1, 5 * BLOCK + 7])
@@ -29,16 +28,13 @@ def test_an_error_in_a_block_is_not_lost(threads):
         blocks.run(work)
 
 
-def test_bits_hang_not_on_the_number_of_threads(tmp_path):
-    files = []
-    for threads in (1, 2):
-        files.append([tmp_path / f"{threads}.nc", tmp_path / f"{threads}.series.nc"])
-        settle(
-            load_model(), Properties(), 2500, 1e-3, 0.1, 1.0, 0.5, 1, *files[-1],
-            precision="float64", threads=threads,
-        )  # fmt: skip
-    for one, two in zip(*files, strict=True):
-        assert xr.load_dataset(one).identical(xr.load_dataset(two))
+def test_bits_do_not_depend_on_the_number_of_threads(tmp_path):
+    one, two = (
+        run(tmp_path, load_model(), particles=2500, duration=1.0, threads=threads)
+        for threads in (1, 2)
+    )
+    for a, b in zip(one, two, strict=True):
+        assert a.identical(b)
 
 
 def test_no_threads_are_refused():

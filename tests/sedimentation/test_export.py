@@ -7,21 +7,21 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from dustfall.forces.rotne_prager import IsolatedStokes
-from dustfall.sedimentation import Properties, settle
+from dustfall.forces.formulas.isolated import MODEL as ISOLATED
 from dustfall.sedimentation.export import CELL_KINDS, export_vtkhdf
+from tests.sedimentation.runs import run
 
 PARTICLES = 40
 
 
 @pytest.fixture(scope="module")
 def trajectory(tmp_path_factory):
-    path = tmp_path_factory.mktemp("run") / "case.nc"
-    settle(
-        IsolatedStokes(), Properties(), PARTICLES, 1e-3, 0.5, 6.0, 2.0, 1, path,
-        path.with_suffix(".series.nc"), start="stokes",
+    folder = tmp_path_factory.mktemp("run")
+    run(
+        folder, ISOLATED, particles=PARTICLES, step=0.5, duration=6.0, save_interval=2.0,
+        start="stokes", precision="float32",
     )  # fmt: skip
-    return path
+    return folder / "case.nc"
 
 
 def frame(file, k):

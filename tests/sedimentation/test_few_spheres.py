@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from dustfall.forces.rotne_prager import rotne_prager_forces
-from dustfall.sedimentation import Properties
-from dustfall.sedimentation.dynamics import advance, drag_coefficients
+from dustfall.sedimentation import Closure, Drag, Properties, State, step
+from dustfall.sedimentation.closures.nearest_neighbours import drag_coefficients
 from dustfall.stokes import forces_on_fixed_spheres
 from dustfall.stokes.references.exact_pairs import forces_on_two_spheres, pair_drag
+from dustfall.suspension.rotne_prager import rotne_prager_forces
 
 STOKES_NUMBER = Properties().stokes_number
 
@@ -32,23 +32,29 @@ class AllSpheres:
         return np.array([self.solver(scene)[0] for scene in scenes])
 
 
-def boundary_elements(centres):
+def multipoles(centres):
     return forces_on_fixed_spheres(centres, tolerance=TOLERANCE)
 
 
-def settle_in_open_space(model, position, duration, step):
+class OpenSpace(Closure):
+    """Every sphere feels all others, and nothing is periodic."""
+
+    def __init__(self, model):
+        self.model = model
+
+    def __call__(self, state):
+        n = len(state.position)
+        others = np.array([[j for j in range(n) if j != i] for i in range(n)])
+        vectors = state.position[others] - state.position[:, None]
+        return Drag(*drag_coefficients(self.model, state.velocity, vectors))
+
+
+def settle_in_open_space(model, position, duration, size):
     """The package's own step without a box: positions and velocities at the end, from rest."""
-    n = len(position)
-    others = np.array([[j for j in range(n) if j != i] for i in range(n)])
-    velocity = np.zeros((n, 3))
-    before = None
-    for _ in range(round(duration / step)):
-        now = drag_coefficients(model, velocity, position[others] - position[:, None])
-        before = before or now
-        beta, side = (1.5 * a - 0.5 * b for a, b in zip(now, before, strict=True))
-        position, velocity = advance(position, velocity, beta, side, step, STOKES_NUMBER)
-        before = now
-    return position, velocity
+    state = State(position, np.zeros_like(position, dtype=float), 1e-3)
+    for _ in range(round(duration / size)):
+        state = step(state, OpenSpace(model), size, STOKES_NUMBER)
+    return state.position, state.velocity
 
 
 def integrate(solver, position, duration):
@@ -79,7 +85,7 @@ PAIRS = {
 @pytest.mark.parametrize("pair", PAIRS)
 def test_two_spheres_settle_as_the_exact_resistance_says(pair):
     position = np.array(PAIRS[pair], dtype=float)
-    x, v = settle_in_open_space(AllSpheres(boundary_elements), position, 3.0, 0.1)
+    x, v = settle_in_open_space(AllSpheres(multipoles), position, 3.0, 0.1)
     # Equal spheres from rest never part: with the drag exact at their distance the velocity is
     # that of two linear equations, along and across the line of centres.
     line = position[1] - position[0]
@@ -119,11 +125,11 @@ def test_three_spheres_settle_as_an_independent_integration_says():
     assert parted.max() > 0.1  # unlike two, three equal spheres move against each other
 
 
-def test_three_spheres_by_boundary_elements_settle_as_an_independent_integration_says():
+def test_three_spheres_by_multipoles_settle_as_an_independent_integration_says():
     def solver(centres, flow):
         return forces_on_fixed_spheres(centres, flow=flow, tolerance=TOLERANCE)
 
-    x, v = settle_in_open_space(AllSpheres(boundary_elements), TRIPLE, 1.0, 0.05)
+    x, v = settle_in_open_space(AllSpheres(multipoles), TRIPLE, 1.0, 0.05)
     expected_x, expected_v = integrate(solver, TRIPLE, 1.0)
     np.testing.assert_allclose(v, expected_v, atol=1e-4)
     np.testing.assert_allclose(x, expected_x, atol=1e-3)

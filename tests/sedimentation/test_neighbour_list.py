@@ -34,17 +34,21 @@ MOTIONS = {
 }
 
 
+@pytest.mark.parametrize("number", [1, 5, 12])
 @pytest.mark.parametrize("motion", MOTIONS)
 @pytest.mark.parametrize("start", STARTS)
-def test_moving_particles_have_the_neighbours_of_a_plain_search_to_the_last_bit(start, motion):
+def test_moving_particles_have_the_neighbours_of_a_plain_search_to_the_last_bit(
+    start, motion, number
+):
     rng = np.random.default_rng(8)
     make, side = STARTS[start]
     position = make(rng)
     n = len(position)
+    number = min(number, n - 1)
     velocity = MOTIONS[motion](rng, n)
-    neighbours = NeighbourList(n, side, Blocks(n))
+    neighbours = NeighbourList(n, side, Blocks(n), number)
     for _ in range(12):
-        vectors, index = nearest_neighbours(position, side)
+        vectors, index = nearest_neighbours(position, side, number)
         np.testing.assert_array_equal(neighbours.update(position), index)
         np.testing.assert_array_equal(neighbours.vectors(np.arange(n)), vectors)
         position = position + velocity + 0.02 * rng.normal(size=(n, 3)) * velocity.any()

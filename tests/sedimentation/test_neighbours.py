@@ -61,6 +61,15 @@ def test_neighbours_are_the_five_nearest_of_a_periodic_tree(case):
         assert same[distinct & (sixth - distance[:, 4] > 10 * tolerance)].all()
 
 
+@pytest.mark.parametrize("number", [1, 12, 50])
+def test_any_number_of_nearest_is_found(number):
+    position, side = np.random.default_rng(6).random((300, 3)) * 7.0, 7.0
+    vectors, index = nearest_neighbours(position, side, number)
+    distance, expected = cKDTree(position, boxsize=side).query(position, k=number + 1)
+    np.testing.assert_array_equal(index, expected[:, 1:])
+    np.testing.assert_allclose(np.linalg.norm(vectors, axis=2), distance[:, 1:], atol=1e-12)
+
+
 def test_vectors_lead_to_the_neighbours_up_to_whole_sides():
     rng = np.random.default_rng(4)
     position, side = rng.normal(scale=100, size=(500, 3)), 30.0
@@ -82,9 +91,9 @@ def test_vectors_do_not_change_under_translation():
 @pytest.mark.parametrize(
     ("position", "side", "named"),
     [
-        (np.zeros((5, 3)), 1.0, "5 particles"),
+        (np.zeros((5, 3)), 1.0, "5 particles: at least 6"),
         (np.zeros((6, 2)), 1.0, r"\(6, 2\)"),
-        (np.zeros((6, 3)), 0.0, "side"),
+        (np.zeros((6, 3)), 0.0, "box_length is"),
         (np.where(np.arange(18).reshape(6, 3) == 7, np.nan, 0.5), 1.0, "particle 2"),
     ],
 )

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from dustfall.sedimentation import cube_side, random_positions
+from dustfall.sedimentation import box_length, random_positions
 
 
 @pytest.mark.parametrize(
@@ -10,7 +10,7 @@ from dustfall.sedimentation import cube_side, random_positions
 )
 def test_random_spheres_do_not_overlap_and_are_complete(particles, volume_fraction):
     position = random_positions(np.random.default_rng(1), particles, volume_fraction)
-    side = cube_side(particles, volume_fraction)
+    side = box_length(particles, volume_fraction)
     assert position.shape == (particles, 3)
     assert ((position >= 0) & (position < side)).all()
     distance, _ = cKDTree(position, boxsize=side).query(position, k=2)
@@ -18,7 +18,7 @@ def test_random_spheres_do_not_overlap_and_are_complete(particles, volume_fracti
 
 
 def test_cube_holds_the_volume_fraction():
-    assert 33_000 * np.pi / 6 / cube_side(33_000, 1e-3) ** 3 == pytest.approx(1e-3)
+    assert 33_000 * np.pi / 6 / box_length(33_000, 1e-3) ** 3 == pytest.approx(1e-3)
 
 
 def test_positions_hang_on_the_seed_alone():
@@ -28,7 +28,7 @@ def test_positions_hang_on_the_seed_alone():
 
 
 def test_dilute_spheres_are_uniform_in_the_cube():
-    position = random_positions(np.random.default_rng(2), 8000, 1e-6) / cube_side(8000, 1e-6)
+    position = random_positions(np.random.default_rng(2), 8000, 1e-6) / box_length(8000, 1e-6)
     octants = np.histogramdd(position, bins=2, range=3 * [(0, 1)])[0]
     # 1000 expected in each; five standard deviations.
     assert np.abs(octants - 1000).max() < 5 * np.sqrt(1000)
@@ -45,6 +45,6 @@ def test_jammed_packing_is_given_up_and_names_phi():
         random_positions(np.random.default_rng(1), 200, 0.379)
 
 
-def test_fewer_than_six_particles_are_refused():
-    with pytest.raises(ValueError, match="5 particles"):
-        cube_side(5, 1e-3)
+def test_a_cube_without_a_particle_is_refused():
+    with pytest.raises(ValueError, match="0 particles"):
+        box_length(0, 1e-3)

@@ -2,22 +2,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from dustfall.forces.rotne_prager import RotnePrager
-from dustfall.sedimentation import Properties, random_positions, settle
+from dustfall.sedimentation import random_positions, start_from
 from dustfall.sedimentation.start import read_start
+from tests.sedimentation.runs import run
 
 POSITIONS = random_positions(np.random.default_rng(1), 40, 1e-3)
 VELOCITIES = np.random.default_rng(2).normal(size=(40, 3))
-
-
-def run(folder, **changes):
-    settings = {"step": 0.1, "duration": 1.0, "save_interval": 0.5, "precision": "float64"}
-    files = folder / "case.nc", folder / "case.series.nc"
-    settle(
-        RotnePrager(), Properties(), 40, 1e-3, seed=1, trajectory=files[0], series=files[1],
-        **settings | changes,
-    )  # fmt: skip
-    return [xr.load_dataset(file) for file in files]
 
 
 def test_a_run_goes_on_from_the_last_frame_of_another(tmp_path):
@@ -73,11 +63,12 @@ def test_files_that_do_not_fit_are_refused_by_name(tmp_path):
 @pytest.mark.parametrize(
     ("change", "named"),
     [
-        ({"velocities": VELOCITIES[:7]}, r"velocities have shape \(7, 3\)"),
-        ({"velocities": VELOCITIES * np.inf}, "velocities at the start"),
-        ({"positions": np.where(POSITIONS > 5, np.nan, POSITIONS)}, "positions at the start"),
+        ({"velocity": VELOCITIES[:7]}, r"velocities have shape \(7, 3\)"),
+        ({"velocity": VELOCITIES * np.inf}, "velocities at the start"),
+        ({"velocity": "flying"}, "start is 'flying'"),
+        ({"position": np.where(POSITIONS > 5, np.nan, POSITIONS)}, "positions at the start"),
     ],
 )
-def test_starts_that_cannot_be_are_refused_by_name(tmp_path, change, named):
+def test_starts_that_cannot_be_are_refused_by_name(change, named):
     with pytest.raises(ValueError, match=named):
-        run(tmp_path, **change)
+        start_from(**{"position": POSITIONS, "volume_fraction": 1e-3} | change)

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from dustfall.forces.rotne_prager import rotne_prager_forces
-from dustfall.sedimentation.start import cube_side, random_positions
+from dustfall.sedimentation.start import random_positions
+from dustfall.sedimentation.state import box_length
 from dustfall.suspension.periodic import HASIMOTO, periodic_mobility
+from dustfall.suspension.rotne_prager import rotne_prager_forces
 from dustfall.units import RADIUS
 
 
@@ -19,7 +20,7 @@ def test_a_simple_cubic_lattice_settles_as_hasimoto_says(phi):
 
 
 def test_the_splitting_of_the_sum_changes_nothing():
-    positions, side = random_positions(np.random.default_rng(1), 40, 1e-2), cube_side(40, 1e-2)
+    positions, side = random_positions(np.random.default_rng(1), 40, 1e-2), box_length(40, 1e-2)
     one, other = (
         periodic_mobility(positions, side, 1e-8, splitting / side) for splitting in (5.0, 11.0)
     )
@@ -39,7 +40,7 @@ def test_few_spheres_in_a_huge_cube_are_those_in_unbounded_fluid():
 
 
 def test_whole_sides_change_nothing_and_overlaps_are_refused():
-    positions, side = random_positions(np.random.default_rng(1), 20, 1e-2), cube_side(20, 1e-2)
+    positions, side = random_positions(np.random.default_rng(1), 20, 1e-2), box_length(20, 1e-2)
     images = positions + side * np.random.default_rng(2).integers(-5, 6, positions.shape)
     np.testing.assert_allclose(
         periodic_mobility(images, side), periodic_mobility(positions, side), atol=1e-12

@@ -79,14 +79,13 @@ def test_winner_needs_both_components_and_equal_folds():
 
 def test_a_fold_learns_the_same_alone_and_beside_others(few):
     neighbours, force = few
-    scenes, _ = training_scenes("idnn", neighbours, "logarithm", 1)
+    scenes, _ = training_scenes("idnn", neighbours, "logarithm")
     splits = [(np.arange(100 * k, 600), np.arange(100 * k)) for k in (1, 2)]
-    trials = [[1, 1], [1, 2]]
 
     def errors(chosen):
         trained = train_networks(
             "idnn", scenes, force, "lateral", "8/6", [splits[k] for k in chosen], SETTINGS,
-            [trials[k] for k in chosen],
+            1, [k + 1 for k in chosen],
         )  # fmt: skip
         return [history.validation_error for _, history in trained]
 

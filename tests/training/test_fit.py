@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 import torch
 
-from dustfall.forces import Reflections
+from dustfall.forces.formulas.reflections import MODEL as REFLECTED
+from dustfall.streams import Purpose, stream
 from dustfall.training import PAPER_SETTINGS, TrainingSettings, train_model
 from tests.forces.scenes import LAYERS, corrected_forces, random_neighbours
 
@@ -21,14 +22,14 @@ def test_anchored_model_exceeds_the_reflections_on_unseen_scenes(models):
     neighbours = random_neighbours(1000, seed=9)
     force = corrected_forces(neighbours)
     error = (models["anchored"].predict(neighbours) - force).std(axis=0)
-    baseline = (Reflections().predict(neighbours) - force).std(axis=0)
+    baseline = (REFLECTED.predict(neighbours) - force).std(axis=0)
     assert (error < 0.6 * baseline).all()
 
 
 def test_reported_scores_are_those_of_the_kept_weights(models, samples):
     neighbours, force = samples
     model = models["idnn"]
-    rows = np.sort(np.random.default_rng([1, 0]).permutation(len(neighbours))[:300])
+    rows = np.sort(stream(Purpose.VALIDATION, 1).permutation(len(neighbours))[:300])
     scores = model.header["training"]["validation"]
     predicted = model.predict(neighbours[rows])
     assert scores["streamwise"]["r2"] == pytest.approx(r2(predicted[:, 1], force[rows, 1]))

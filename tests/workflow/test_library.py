@@ -16,7 +16,7 @@ def files_of(folder, code: str) -> list[str]:
 def test_imports_through_other_modules_count(tmp_path):
     files = files_of(tmp_path, "from dustfall.sedimentation.settle import settle")
     assert "dustfall/sedimentation/settle.py" in files
-    assert "dustfall/sedimentation/neighbours.py" in files
+    assert "dustfall/sedimentation/state.py" in files
     assert "dustfall/training/fit.py" not in files
     assert "dustfall/stokes/elements/single_layer.py" not in files
 
@@ -39,6 +39,12 @@ def test_every_way_to_import_counts(tmp_path, code):
 def test_a_name_that_a_package_exports_brings_the_modules_of_the_package(tmp_path):
     files = files_of(tmp_path, "from dustfall.figures import save")
     assert {"dustfall/figures/__init__.py", "dustfall/figures/style.py"} <= set(files)
+
+
+def test_a_package_that_looks_for_its_modules_brings_them_all(tmp_path):
+    files = files_of(tmp_path, "from dustfall.forces.formulas import FORMULAS")
+    formulas = (ROOT / "dustfall/forces/formulas").glob("*.py")
+    assert {file.relative_to(ROOT).as_posix() for file in formulas} <= set(files)
 
 
 def test_a_name_made_up_at_run_time_is_refused(tmp_path):

@@ -54,7 +54,7 @@ GALILEO_CASES = [
 ]
 
 # Force models that are trained; the others need no file.
-LEARNED_MODELS = ["anchored", "idnn", "pairwise", "dense", "dense_sorted"]
+LEARNED_MODELS = trained_models()
 
 
 def trained(model):

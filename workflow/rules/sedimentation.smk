@@ -16,7 +16,8 @@ rule sedimentation:
     resources:
         checkpoint_interval=config["sedimentation"]["checkpoint_interval"],
     params:
-        seed=lambda wc: plan.case_seed(config, CASES[wc.case].start),
+        seed=config["seed"],
+        stream=lambda wc: plan.start_stream(CASES[wc.case].start),
         model=lambda wc: plan.force_model(config, wc.case),
         particles=lambda wc: CASES[wc.case].particles,
         volume_fraction=lambda wc: CASES[wc.case].volume_fraction,

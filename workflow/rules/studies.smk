@@ -19,7 +19,8 @@ rule study_of_a_step:
         checkpoint_interval=config["sedimentation"]["checkpoint_interval"],
     params:
         # The same start for each step.
-        seed=lambda wc: plan.case_seed(config, "step"),
+        seed=config["seed"],
+        stream=plan.start_stream("step"),
         model=config["sedimentation"]["model"],
         particles=config["studies"]["particles"],
         volume_fraction=config["studies"]["volume_fraction"],

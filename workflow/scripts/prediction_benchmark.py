@@ -15,7 +15,7 @@ from dustfall.forces.learned import load_model
 joblog.start(snakemake.log[0])
 
 neighbours = read(snakemake.input.data).neighbours
-models = [*map(load_model, snakemake.input.models), *(formula() for formula in FORMULAS.values())]
+models = [*map(load_model, snakemake.input.models), *FORMULAS.values()]
 cost = {model.name: prediction_cost(model, neighbours) for model in models}
 
 scores = pd.read_csv(snakemake.input.scores)

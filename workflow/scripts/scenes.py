@@ -1,10 +1,10 @@
 """Draw the random scenes of one shard."""
 
-import h5py
 import numpy as np
 
 import joblog
-from dustfall.files import atomic
+from dustfall.columns import write_columns
+from dustfall.dataset import SCENE_COLUMNS
 from dustfall.scenes import random_scenes
 
 joblog.start(snakemake.log[0])
@@ -14,11 +14,6 @@ numbers = np.arange(*params.numbers)
 neighbours, phi = random_scenes(
     params.seed, snakemake.wildcards.law, numbers, (params.phi_min, params.phi_max)
 )
-with atomic(snakemake.output[0]) as path, h5py.File(path, "w") as file:
-    for name, values, unit in (
-        ("neighbours", neighbours, "d_p"),
-        ("volume_fraction", phi, "1"),
-        ("scene", numbers, "1"),
-    ):
-        file.create_dataset(name, data=values, track_times=False).attrs["unit"] = unit
+values = {"neighbours": neighbours, "volume_fraction": phi, "scene": numbers}
+write_columns(snakemake.output[0], SCENE_COLUMNS, values)
 print(f"{len(numbers)} scenes, phi from {phi.min():.3g} to {phi.max():.3g}")

@@ -9,6 +9,7 @@ from dustfall.analysis.evaluation import scores
 from dustfall.dataset import read, split
 from dustfall.files import atomic
 from dustfall.forces.features import KINDS
+from dustfall.streams import Purpose, stream
 from dustfall.training.fit import TrainingSettings, train_model
 
 progress = joblog.start(snakemake.log[0])
@@ -18,7 +19,7 @@ training, test = split(read(snakemake.input.data), params.test_share, params.see
 training = training.of_laws(params.laws)
 if wildcards.number != "all":
     # One order for all numbers: a larger set holds the smaller ones.
-    order = np.random.default_rng(params.seed).permutation(len(training))
+    order = stream(Purpose.LEARNING_CURVE, params.seed).permutation(len(training))
     training = training.select(np.sort(order[: int(wildcards.number)]))
 model = train_model(
     wildcards.model,

@@ -1,21 +1,20 @@
-"""Compiled forces on six fixed spheres: Rotne-Prager mobility, reflected dipoles, exact pairs.
+"""Compiled forces on a sphere among a few: Rotne-Prager mobility, reflected dipoles, exact pairs.
 
-`six_sphere_forces` carries LANES scenes side by side: component k of row i of a scratch array lies
-at [i, k * LANES + lane]. So the distances between components are constants of the program, which
-is what the compiler needs to know before it turns the loops over lanes into vector instructions.
+`forces_among_neighbours` carries LANES scenes side by side: component k of row i of a scratch array
+lies at [i, k * LANES + lane]. So the distances between components are constants of the program,
+which is what the compiler needs to know before it turns the loops over lanes into vector
+instructions.
 """
 
 import numpy as np
 from numba import njit
 
-from dustfall.forces.frames import NEIGHBOURS
 from dustfall.units import STOKES_DRAG
 
 LANES = 64
+"""Scenes side by side: several vectors wide, and scratch for six spheres fits a core's cache."""
+
 _L = LANES
-_SPHERES = NEIGHBOURS + 1
-_PAIRS = _SPHERES * (_SPHERES - 1) // 2
-_REFERENCE = _SPHERES - 1  # the reference sphere comes last, after its neighbours
 
 POWER = 6
 """The pair correction falls as (d_p / distance)^6 once two dipoles are reflected."""
@@ -28,50 +27,56 @@ _TORQUE = 4 / 3 * 0.25
 TERMS = 7
 """Coefficients of the polynomials of the pair correction, highest power first."""
 
+NO_CORRECTION = np.zeros((2, TERMS))
+"""For forces without a pair correction."""
+
 _compiled = njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
 
 
 @_compiled
-def six_sphere_forces(neighbours, reflections, correction):
-    """Force (m, 3) [Re_p c_D] on the reference sphere of scenes (m, 5, 3) [d_p] in flow along +y.
+def forces_among_neighbours(neighbours, reflections, correction):
+    """Force (m, 3) [Re_p c_D] on the reference sphere of scenes (m, k, 3) [d_p] in flow along +y.
 
     `reflections` of the dipoles, `correction` (2, TERMS) polynomials in d_p / distance of a pair's
-    forces along and across its line of centres; zeros for none (see `reflections`, `rotne_prager`).
+    forces along and across its line of centres (see `forces.formulas`).
     """
-    count = neighbours.shape[0]
+    count, others, _ = neighbours.shape
+    # The reference sphere comes last, after its neighbours; so do its pairs.
+    spheres = others + 1
+    pairs = spheres * others // 2
     force = np.empty((count, 3))
-    centre = np.zeros((_SPHERES, 3 * LANES))
-    pair = np.empty((_PAIRS, 7 * LANES))
+    centre = np.zeros((spheres, 3 * LANES))
+    pair = np.empty((pairs, 7 * LANES))
     # Blocks (i, j <= i) of the mobility, then of its Cholesky factor, row by row.
-    factor = np.empty((_PAIRS + _SPHERES, 9 * LANES))
-    total = np.empty((_SPHERES, 3 * LANES))
-    change = np.empty((_SPHERES, 3 * LANES))
-    gradient = np.empty((_SPHERES, 8 * LANES))
+    factor = np.empty((pairs + spheres, 9 * LANES))
+    total = np.empty((spheres, 3 * LANES))
+    change = np.empty((spheres, 3 * LANES))
+    gradient = np.empty((spheres, 8 * LANES))
     own = np.empty(3 * LANES)
     for start in range(0, count, LANES):
         for lane in range(LANES):
             scene = neighbours[min(start + lane, count - 1)]
-            for j in range(NEIGHBOURS):
+            for j in range(others):
                 for k in range(3):
                     centre[j, k * LANES + lane] = scene[j, k]
         _assemble(factor, pair, centre)
-        _factorise(factor)
+        _factorise(factor, spheres)
         total[:] = 0.0
         total[:, LANES : 2 * LANES] = 1.0
         _solve(factor, total)
         own[:] = 0.0
-        for j in range(NEIGHBOURS):
-            _correct(own, total[_REFERENCE], total[j], pair[_PAIRS - NEIGHBOURS + j], correction)
+        for j in range(others):
+            _correct(own, total[others], total[j], pair[pairs - others + j], correction)
         change[:] = total
         for _ in range(reflections):
             _reflect(change, gradient, pair)
             _solve(factor, change)
-            for i in range(_SPHERES):
+            for i in range(spheres):
                 for k in range(3 * LANES):
                     total[i, k] += change[i, k]
         for lane in range(min(LANES, count - start)):
             for k in range(3):
-                value = total[_REFERENCE, k * LANES + lane] + own[k * LANES + lane]
+                value = total[others, k * LANES + lane] + own[k * LANES + lane]
                 force[start + lane, k] = STOKES_DRAG * value
     return force
 
@@ -79,7 +84,7 @@ def six_sphere_forces(neighbours, reflections, correction):
 @_compiled
 def _assemble(factor, pair, centre):
     number = 0
-    for i in range(_SPHERES):
+    for i in range(len(centre)):
         row = i * (i + 1) // 2
         for j in range(i):
             _couple(factor[row + j], pair[number], centre[i], centre[j])
@@ -130,11 +135,11 @@ def _couple(block, pair, here, there):
 
 
 @_compiled
-def _factorise(factor):
+def _factorise(factor, spheres):
     """Cholesky factor in blocks of 3 x 3; its diagonal is kept inverted."""
-    for j in range(_SPHERES):
+    for j in range(spheres):
         column = j * (j + 1) // 2
-        for i in range(j, _SPHERES):
+        for i in range(j, spheres):
             row = i * (i + 1) // 2
             for k in range(j):
                 _subtract_product(factor[row + j], factor[row + k], factor[column + k])
@@ -191,12 +196,12 @@ def _divide_block(block, diagonal):
 @_compiled
 def _solve(factor, vector):
     """Forces that move the spheres at given velocities, in place."""
-    for i in range(_SPHERES):
+    for i in range(len(vector)):
         row = i * (i + 1) // 2
         for j in range(i):
             _substitute(vector[i], vector[j], factor[row + j], 3, 1)
         _substitute_forward(vector[i], factor[row + i])
-    for i in range(_SPHERES - 1, -1, -1):
+    for i in range(len(vector) - 1, -1, -1):
         row = i * (i + 1) // 2
         _substitute_back(vector[i], factor[row + i])
         for j in range(i):
@@ -244,14 +249,14 @@ def _reflect(vector, gradient, pair):
     """Forces in, velocities out: of the dipoles that the forces' flow induces on the spheres."""
     gradient[:] = 0.0
     number = 0
-    for i in range(_SPHERES):
+    for i in range(len(vector)):
         for j in range(i):
             _gradient(gradient[i], vector[j], pair[number], 1.0)
             _gradient(gradient[j], vector[i], pair[number], -1.0)
             number += 1
     vector[:] = 0.0
     number = 0
-    for i in range(_SPHERES):
+    for i in range(len(vector)):
         for j in range(i):
             _velocity(vector[j], gradient[i], pair[number], 1.0)
             _velocity(vector[i], gradient[j], pair[number], -1.0)

@@ -1,6 +1,6 @@
 import numpy as np
 
-from dustfall.sedimentation.statistics import changed_neighbours, contacts
+from dustfall.sedimentation.closures.contacts import changed_neighbours, contacts
 
 
 def test_changes_of_neighbours_are_told_apart():

@@ -1,0 +1,71 @@
+"""HDF5 files of columns, each with its units, its meaning, and a checksum of its content."""
+
+import hashlib
+from collections.abc import Iterable, Mapping
+from os import PathLike
+from typing import NamedTuple
+
+import h5py
+import numpy as np
+
+from dustfall.files import atomic
+
+
+class Column(NamedTuple):
+    """What a column holds: units ("1" for plain numbers, "" for text and names), and in words."""
+
+    units: str
+    description: str
+
+
+def write_columns(
+    path: str | PathLike,
+    columns: Mapping[str, Column],
+    values: Mapping[str, object],
+    attributes: Mapping[str, object] | None = None,
+) -> None:
+    """Write arrays as the datasets of an HDF5 file, with `attributes` of the whole file.
+
+    Equal data give equal files: no time stamp goes in. Text is stored as bytes. Raises KeyError
+    for a column without values.
+    """
+    with atomic(path) as temporary, h5py.File(temporary, "w", libver="v110") as file:
+        file.attrs.update(attributes or {})
+        for name, column in columns.items():
+            array = np.asarray(values[name])
+            if array.dtype.kind == "U":
+                array = np.char.encode(array, "utf-8")
+            stored = file.create_dataset(name, data=array, track_times=False)
+            stored.attrs["units"] = column.units
+            stored.attrs["description"] = column.description
+            stored.attrs["sha256"] = _checksum(array)
+
+
+def read_columns(path: str | PathLike, names: Iterable[str]) -> dict[str, np.ndarray]:
+    """Read some columns of a file that `write_columns` wrote; text comes back as text.
+
+    Raises ValueError, with the name of the file, where it is damaged or lacks a column.
+    """
+    found = {}
+    try:
+        with h5py.File(path) as file:
+            for name in names:
+                array = file[name][()]
+                if file[name].attrs["sha256"] != _checksum(array):
+                    raise ValueError(f"{name} does not match its checksum")
+                text = array.dtype.kind == "S"
+                found[name] = np.char.decode(array, "utf-8") if text else array
+    except FileNotFoundError:
+        raise
+    except (OSError, RuntimeError, KeyError, ValueError) as error:
+        raise ValueError(
+            f"{path} is damaged or no file of these columns ({error}); remove it, and run again "
+            "what makes it"
+        ) from error
+    return found
+
+
+def _checksum(array: np.ndarray) -> str:
+    digest = hashlib.sha256(f"{array.dtype.str} {array.shape}".encode())
+    digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()

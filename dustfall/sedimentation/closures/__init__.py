@@ -1,0 +1,5 @@
+"""Closures: what tells the drag on all particles from their state."""
+
+from dustfall.sedimentation.closures.nearest_neighbours import NearestNeighbours
+
+__all__ = ["NearestNeighbours"]

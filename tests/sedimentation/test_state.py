@@ -1,0 +1,39 @@
+"""A step is exact for a drag law that holds, and for a constant force the midpoint rule."""
+
+import numpy as np
+import pytest
+
+from dustfall.sedimentation import Drag, State, move
+
+RNG = np.random.default_rng(7)
+
+
+@pytest.mark.parametrize("beta", [0.0, 1e-9, 0.01, 0.3, 1.0, 2.0, -0.2])
+@pytest.mark.parametrize("step", [0.05, 0.17, 3.0])
+def test_step_is_exact_for_constant_coefficients(beta, step):
+    position, velocity = RNG.normal(size=(2, 1, 3))
+    push = RNG.normal(size=(1, 3))
+    state = move(State(position, velocity, 1e-3), Drag(np.array([beta]), push), step, 9.0)
+    x, v = state.position, state.velocity
+    # The Taylor series of the exact solution, summed until nothing is left.
+    derivative = push - [0, 0, 1] - beta * velocity
+    expected_v, expected_x = velocity + step * derivative, position + 9 * step * velocity
+    expected_x = expected_x + 9 * step**2 / 2 * derivative
+    factor = step
+    for k in range(2, 60):
+        derivative = -beta * derivative
+        factor *= step / k
+        expected_v = expected_v + factor * derivative
+        expected_x = expected_x + 9 * factor * step / (k + 1) * derivative
+    np.testing.assert_allclose(v, expected_v, rtol=1e-13, atol=1e-13)
+    np.testing.assert_allclose(x, expected_x, rtol=1e-13, atol=1e-12)
+
+
+def test_a_constant_force_over_the_step_is_the_implicit_midpoint_rule():
+    position, velocity, force = RNG.normal(size=(3, 4, 3))
+    before = State(position, velocity, 1e-3, last_drag=Drag(np.ones(4), -force))
+    after = move(before, Drag(np.zeros(4), force, whole_step=True), 0.3, 9.0)
+    np.testing.assert_allclose(after.velocity, velocity + 0.3 * (force - [0, 0, 1]), atol=1e-14)
+    mean = (velocity + after.velocity) / 2
+    np.testing.assert_allclose(after.position, position + 9.0 * 0.3 * mean, atol=1e-13)
+    assert after.steps == 1
