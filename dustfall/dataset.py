@@ -14,9 +14,7 @@ import pandas as pd
 
 from dustfall.files import atomic
 from dustfall.scenes import LAWS
-
-NOT_CONVERGED = 1
-"""Status of a scene that is left out (`stokes.solve`, whose import would load its kernels)."""
+from dustfall.solution import Status
 
 TEST_SCENES = 1000
 """Item of the random stream that draws the test scenes."""
@@ -229,7 +227,7 @@ def _read_shard(shard: Shard) -> tuple[Dataset, pd.DataFrame]:
                 "radial_law": shard.radial_law,
                 "scene": number,
                 "volume_fraction": part.volume_fraction,
-                "converged": solutions["status"][()] != NOT_CONVERGED,
+                "converged": solutions["status"].asstr()[()] != Status.NOT_CONVERGED,
                 "error_estimate": solutions["error_estimate"][:, 0],
                 **{name: solutions[name][()] for name in ("iterations", "residual", "minimum_gap")},
             }

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from dustfall.dataset import Dataset, Shard, aggregate, check, read, split, summary, write
+from dustfall.solution import Status
 
 NUMBERS = {"uniform": 23, "ball": 10}
 
@@ -46,7 +47,11 @@ def write_shards(folder, data: Dataset, size: int, unconverged=()) -> list[Shard
                 file["force"] = np.concatenate(
                     [part.force[:, None], np.full((len(part), 5, 3), 99.0)], axis=1
                 )
-                file["status"] = np.array([(law, k) in unconverged for k in part.scene], int)
+                status = [
+                    Status.NOT_CONVERGED if (law, k) in unconverged else Status.OUT_OF_REACH
+                    for k in part.scene
+                ]
+                file["status"] = np.array(status).astype(bytes)
                 file["error_estimate"] = np.arange(6.0 * len(part)).reshape(-1, 6)
                 for name in ("iterations", "residual", "minimum_gap"):
                     file[name] = np.arange(len(part), dtype=float)

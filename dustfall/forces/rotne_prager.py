@@ -3,6 +3,7 @@
 import numpy as np
 
 from dustfall.forces.frames import check_neighbours, hold_at_contact, sort_by_distance
+from dustfall.spheres import checked_positions, flow_direction
 from dustfall.suspension.six_spheres import TERMS, six_sphere_forces
 from dustfall.units import STOKES_DRAG
 
@@ -72,20 +73,13 @@ def rotne_prager_inverse(neighbours: np.ndarray) -> np.ndarray:
 def rotne_prager_forces(centres, flow=(0.0, 1.0, 0.0)) -> np.ndarray:
     """Return the forces on any number of fixed spheres from the inverted Rotne-Prager mobility.
 
-    Parameters: `centres` (n, 3) in d_p; `flow` (3,), the uniform flow in units of the relative
-    velocity that defines Re_p. Returns (n, 3) in Re_p c_D (an isolated sphere: 24 along the flow).
+    Parameters: `centres` (n, 3) in d_p; `flow` (3,), the uniform flow, whose magnitude makes forces
+    dimensionless. Returns (n, 3) in Re_p c_D (an isolated sphere: 24 along the flow).
     Overlapping pairs take Yamakawa's (1970) extension, which keeps the mobility positive definite.
 
     Raises ValueError for another shape, a value that is not finite, or coincident centres.
     """
-    centres = np.asarray(centres, dtype=float)
-    flow = np.asarray(flow, dtype=float)
-    if centres.ndim != 2 or centres.shape[1] != 3 or len(centres) == 0:
-        raise ValueError(f"centres have shape {centres.shape}; they must be (n, 3) with n >= 1")
-    if flow.shape != (3,):
-        raise ValueError(f"flow has shape {flow.shape}; it must be (3,)")
-    if not (np.isfinite(centres).all() and np.isfinite(flow).all()):
-        raise ValueError("centres and flow must be finite")
+    centres, flow = checked_positions(centres), flow_direction(flow)
     n = len(centres)
     separation = centres[:, None] - centres[None]
     distance = np.linalg.norm(separation, axis=2)
