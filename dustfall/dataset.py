@@ -8,16 +8,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pandas as pd
 
 from dustfall.columns import Column, read_columns, write_columns
 from dustfall.scenes import LAWS
+from dustfall.solution import Status
 from dustfall.streams import Purpose, stream
-
-NOT_CONVERGED = 1
-"""Status of a scene that is left out (`stokes.solve`, whose import would load its kernels)."""
 
 NEIGHBOURS_OF_SCENES = Column("d_p", "centres of the nearest spheres, sorted by distance")
 VOLUME_FRACTION = Column("1", "phi = 15 V_p / (4 pi d_5^3), d_5 the fifth distance")
@@ -29,6 +26,11 @@ SCENE_COLUMNS = {
     "scene": NUMBER,
 }
 """Columns of a shard of scenes."""
+
+SOLUTION_COLUMNS = (
+    "scene", "force", "status", "error_estimate", "iterations", "residual", "minimum_gap",
+)  # fmt: skip
+"""Columns of a shard of force records that the data set reads."""
 
 COLUMNS = {
     "neighbours": NEIGHBOURS_OF_SCENES,
@@ -221,27 +223,22 @@ def summary(dataset: Dataset, solve: pd.DataFrame) -> pd.DataFrame:
 
 def _read_shard(shard: Shard) -> tuple[Dataset, pd.DataFrame]:
     scenes = read_columns(shard.scenes, SCENE_COLUMNS)
-    with h5py.File(shard.solutions) as solutions:
-        number = scenes["scene"]
-        if not np.array_equal(number, solutions["scene"][()]):
-            raise ValueError(f"{shard.solutions} does not solve the scenes of {shard.scenes}")
-        part = Dataset(
-            neighbours=scenes["neighbours"],
-            force=solutions["force"][:, 0],
-            volume_fraction=scenes["volume_fraction"],
-            radial_law=np.full(len(number), shard.radial_law),
-            scene=number,
-        )
-        solve = pd.DataFrame(
-            {
-                "radial_law": shard.radial_law,
-                "scene": number,
-                "volume_fraction": part.volume_fraction,
-                "converged": solutions["status"][()] != NOT_CONVERGED,
-                "error_estimate": solutions["error_estimate"][:, 0],
-                **{name: solutions[name][()] for name in ("iterations", "residual", "minimum_gap")},
-            }
-        )
+    solutions = read_columns(shard.solutions, SOLUTION_COLUMNS)
+    number = scenes["scene"]
+    if not np.array_equal(number, solutions["scene"]):
+        raise ValueError(f"{shard.solutions} does not solve the scenes of {shard.scenes}")
+    law = np.full(len(number), shard.radial_law)
+    part = Dataset(force=solutions["force"][:, 0], radial_law=law, **scenes)
+    solve = pd.DataFrame(
+        {
+            "radial_law": law,
+            "scene": number,
+            "volume_fraction": part.volume_fraction,
+            "converged": solutions["status"] != Status.NOT_CONVERGED,
+            "error_estimate": solutions["error_estimate"][:, 0],
+            **{name: solutions[name] for name in ("iterations", "residual", "minimum_gap")},
+        }
+    )
     return part, solve
 
 

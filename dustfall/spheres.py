@@ -1,37 +1,97 @@
-"""Checks of what every solver is given: where spheres are, and the flow that they meet."""
+"""Checks of what every solver is given: where spheres are, the flow that they meet, a tolerance."""
+
+import numbers
 
 import numpy as np
+from scipy.spatial.distance import cdist
+
+from dustfall.units import CONTACT
+
+LARGEST = 1e100
+"""Largest magnitude of a coordinate [d_p] or a flow, 1 / LARGEST the smallest of a flow that is
+not zero: their squares are numbers still."""
 
 
-def checked_centres(centres) -> np.ndarray:
-    """Centres as an array (n, 3) [d_p]; ValueError for a wrong shape, NaN, or overlap."""
-    centres = np.ascontiguousarray(centres, dtype=float)
+def checked_numbers(name: str, values) -> np.ndarray:
+    """An own array of floats; ValueError for words, holes and rows of different lengths."""
+    try:
+        return np.array(values, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name} must be an array of numbers: {error}") from None
+
+
+def checked_positions(centres) -> np.ndarray:
+    """Centres as an array (n, 3) [d_p] of spheres that may overlap.
+
+    Raises ValueError for what is no (n, 3) numbers with n >= 1, and for coordinates that are not
+    finite or beyond LARGEST.
+    """
+    centres = checked_numbers("centres", centres)
     if centres.ndim != 2 or centres.shape[1] != 3 or len(centres) == 0:
         raise ValueError(f"centres must have the shape (n, 3) with n >= 1, not {centres.shape}")
     bad = np.flatnonzero(~np.isfinite(centres).all(axis=1))
     if len(bad):
         raise ValueError(f"centre of sphere {bad[0]} is not finite: {centres[bad[0]].tolist()}")
+    far = np.flatnonzero((np.abs(centres) > LARGEST).any(axis=1))
+    if len(far):
+        raise ValueError(
+            f"centre of sphere {far[0]} is {centres[far[0]].tolist()} d_p: at most {LARGEST:g} d_p "
+            "are allowed"
+        )
+    return centres
+
+
+def checked_centres(centres) -> np.ndarray:
+    """Centres as an array (n, 3) [d_p] of spheres that do not touch.
+
+    Raises ValueError for what `checked_positions` refuses, and for spheres that overlap or touch.
+    """
+    centres = checked_positions(centres)
     distance = centre_distances(centres)
     i, j = np.unravel_index(distance.argmin(), distance.shape)
-    if distance[i, j] <= 1.0:
+    if distance[i, j] <= CONTACT:
         raise ValueError(
             f"spheres {i} and {j} overlap or touch: their centres are {distance[i, j]:.6g} d_p "
-            "apart, more than 1 is needed"
+            f"apart, more than {CONTACT:g} is needed"
         )
     return centres
 
 
 def checked_flow(flow) -> np.ndarray:
-    """Velocity far away as an array (3,); ValueError for a wrong shape or NaN."""
-    flow = np.asarray(flow, dtype=float)
+    """Velocity far away as an array (3,).
+
+    Raises ValueError for what is no three finite numbers, and for a magnitude that is neither zero
+    nor between 1 / LARGEST and LARGEST.
+    """
+    flow = checked_numbers("flow", flow)
     if flow.shape != (3,) or not np.isfinite(flow).all():
         raise ValueError(f"flow must be three finite numbers, not {flow.tolist()}")
+    size = np.abs(flow).max()
+    if size != 0.0 and not 1.0 / LARGEST <= size <= LARGEST:
+        raise ValueError(
+            f"flow {flow.tolist()}: its magnitude must be zero, or {1.0 / LARGEST:g} to {LARGEST:g}"
+        )
     return flow
+
+
+def flow_direction(flow) -> np.ndarray:
+    """Unit vector (3,) along the flow, zero where nothing flows; refuses what `checked_flow` does.
+
+    Forces are made dimensionless by the magnitude of the flow, so its direction is all they need.
+    """
+    flow = checked_flow(flow)
+    return flow / np.linalg.norm(flow) if np.any(flow) else flow
+
+
+def checked_tolerance(tolerance, lowest: float, highest: float) -> float:
+    """The tolerance as a float; ValueError unless it is a number from `lowest` to `highest`."""
+    if not isinstance(tolerance, numbers.Real) or not lowest <= tolerance <= highest:
+        raise ValueError(f"tolerance {tolerance!r}: allowed are {lowest:g} to {highest:g}")
+    return float(tolerance)
 
 
 def centre_distances(centres) -> np.ndarray:
     """(n, n) centre distances [d_p], inf on the diagonal."""
-    difference = centres[:, None, :] - centres[None, :, :]
-    distance = np.sqrt((difference**2).sum(axis=2))
+    distance = cdist(centres, centres)
     np.fill_diagonal(distance, np.inf)
     return distance

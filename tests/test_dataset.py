@@ -18,6 +18,8 @@ from dustfall.dataset import (
     summary,
     write,
 )
+from dustfall.solution import Status
+from dustfall.stokes.records import write_records
 
 NUMBERS = {"uniform": 23, "ball": 10}
 
@@ -49,16 +51,23 @@ def write_shards(folder, data: Dataset, size: int, unconverged=()) -> list[Shard
             )
             values = {name: getattr(part, name) for name in SCENE_COLUMNS}
             write_columns(shard.scenes, SCENE_COLUMNS, values)
-            with h5py.File(shard.solutions, "w") as file:
-                file["scene"] = part.scene
-                # The other spheres' forces must not get into the data set.
-                file["force"] = np.concatenate(
-                    [part.force[:, None], np.full((len(part), 5, 3), 99.0)], axis=1
-                )
-                file["status"] = np.array([(law, k) in unconverged for k in part.scene], int)
-                file["error_estimate"] = np.arange(6.0 * len(part)).reshape(-1, 6)
-                for name in ("iterations", "residual", "minimum_gap"):
-                    file[name] = np.arange(len(part), dtype=float)
+            status = [
+                Status.NOT_CONVERGED if (law, k) in unconverged else Status.OUT_OF_REACH
+                for k in part.scene
+            ]
+            others = np.full((len(part), 5, 3), 99.0)  # must not get into the data set
+            records = {
+                "scene": part.scene,
+                "force": np.concatenate([part.force[:, None], others], axis=1),
+                "status": np.array(status),
+                "error_estimate": np.arange(6.0 * len(part)).reshape(-1, 6),
+                "degrees": np.zeros((len(part), 6, 6)),
+                **{
+                    name: np.arange(len(part), dtype=float)
+                    for name in ("iterations", "residual", "minimum_gap")
+                },
+            }
+            write_records(shard.solutions, records, part.scene)
             shards.append(shard)
     return shards
 

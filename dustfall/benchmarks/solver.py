@@ -9,13 +9,13 @@ import numpy as np
 import pandas as pd
 from pygrpy.grpy_tensors import muTT
 
+from dustfall.spheres import flow_direction
 from dustfall.stokes.elements.boundary_elements import forces_by_elements
 from dustfall.stokes.elements.mesh import sphere_mesh
-from dustfall.stokes.elements.one_body import OneBody
 from dustfall.stokes.elements.outer_sphere import forces_in_outer_sphere
 from dustfall.stokes.references.fundamental_solutions import reference_forces
 from dustfall.stokes.references.multiblob import multiblob_forces
-from dustfall.stokes.solve import one_body_response, plan_scene, solve
+from dustfall.stokes.solve import fixed_spheres
 from dustfall.units import STOKES_DRAG
 
 EXACT = 1e-8
@@ -24,7 +24,7 @@ EXACT = 1e-8
 PAPER_EDGES = (0.162, 0.29)
 """Edges [radii] of meshes with 637 nodes a particle and 190 on the outer sphere: the paper's."""
 
-HARMONICS = "boundary elements and harmonics"
+MULTIPOLE = "multipoles"
 
 RUNGS = {
     "constant, flat elements": (0.7, 0.35),
@@ -49,15 +49,13 @@ class Method:
     most_scenes: int
 
 
-def methods(body: OneBody, tolerances: Sequence[float], scenes: int, few: int) -> list[Method]:
+def methods(tolerances: Sequence[float], scenes: int, few: int) -> list[Method]:
     """This solver at several tolerances, every rung of the ladder, references and peers.
 
-    body: of the template. scenes, few: scenes of each set for quick and for slow methods. The
+    scenes, few: scenes of each set for quick and for slow methods. The
     paper's formulation on the paper's mesh gets one.
     """
-    found = [
-        Method(HARMONICS, f"tolerance {t:.0e}", _harmonics(body, t), scenes) for t in tolerances
-    ]
+    found = [Method(MULTIPOLE, f"tolerance {t:.0e}", multipole(t), scenes) for t in tolerances]
     for scheme, edges in RUNGS.items():
         for edge in edges:
             mesh = sphere_mesh(edge)
@@ -78,11 +76,7 @@ def methods(body: OneBody, tolerances: Sequence[float], scenes: int, few: int) -
 
 
 def time_against_error(
-    sets: Mapping[str, np.ndarray],
-    methods: Sequence[Method],
-    body: OneBody,
-    repeats=3,
-    progress=None,
+    sets: Mapping[str, np.ndarray], methods: Sequence[Method], repeats: int = 3, progress=None
 ) -> pd.DataFrame:
     """Solve the scenes of every set by every method.
 
@@ -93,7 +87,7 @@ def time_against_error(
     error_95, error_max, covered (share of scenes whose estimate is at least the error) and
     estimate_over_error (median), both NaN for a method without estimates.
     """
-    exact, rows = _harmonics(body, EXACT), []
+    exact, rows = multipole(EXACT), []
     for name, scenes in sets.items():
         truth = np.array([exact(centres)[0][0] for centres in scenes])
         for method in methods:
@@ -129,20 +123,20 @@ def time_against_error(
 
 
 def time_against_spheres(
-    numbers: Sequence[int], body: OneBody, tolerance: float = 1e-4, seed: int = 1, repeats: int = 5
+    numbers: Sequence[int], tolerance: float = 1e-4, seed: int = 1, repeats: int = 5
 ) -> pd.DataFrame:
     """Solve n random spheres at a volume fraction of 1 %, for each n: milliseconds and exponent.
 
     Columns spheres, milliseconds (median of `repeats`), iterations, error_estimate (largest) and
     exponent, the slope of log time against log n over all n from 8.
     """
-    response, rows = one_body_response(body, tolerance), []
+    rows = []
     for n in numbers:
         centres = _random_cloud(n, 0.01, np.random.default_rng([seed, n]))
         seconds = []
         for _ in range(repeats + 1):
             start = time.perf_counter()
-            found = solve(plan_scene(centres, tolerance), response, tolerance=tolerance)
+            found = fixed_spheres(centres, tolerance=tolerance)
             seconds.append(time.perf_counter() - start)
         rows.append((n, 1e3 * np.median(seconds[1:]), found.iterations, found.error_estimate.max()))
     table = pd.DataFrame(rows, columns=["spheres", "milliseconds", "iterations", "error_estimate"])
@@ -156,15 +150,15 @@ def rotne_prager(centres, flow=(0.0, 1.0, 0.0)) -> np.ndarray:
     n = len(centres)
     blocks = muTT(2.0 * np.asarray(centres), np.ones(n))
     mobility = np.transpose(blocks, (0, 2, 1, 3)).reshape(3 * n, 3 * n)
-    pull = np.linalg.solve(mobility, np.tile(np.asarray(flow, dtype=float), n))
+    pull = np.linalg.solve(mobility, np.tile(flow_direction(flow), n))
     return STOKES_DRAG / (6.0 * np.pi) * pull.reshape(n, 3)
 
 
-def _harmonics(body, tolerance):
-    response = one_body_response(body, tolerance)
+def multipole(tolerance: float) -> Callable:
+    """This solver at a tolerance, as `Method.forces`."""
 
     def forces(centres):
-        solution = solve(plan_scene(centres, tolerance), response, tolerance=tolerance)
+        solution = fixed_spheres(centres, tolerance=tolerance)
         return solution.force, solution.error_estimate
 
     return forces

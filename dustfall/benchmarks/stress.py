@@ -6,13 +6,15 @@ import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
+from dustfall.spheres import flow_direction
 from dustfall.stokes.elements.mesh import SphereMesh, sphere_mesh
 from dustfall.stokes.elements.one_body import OneBody
 from dustfall.stokes.elements.single_layer import nodal_integrals, self_interaction
 from dustfall.stokes.harmonics import exact_response
 from dustfall.stokes.multipoles import apply_system, couple_scene, solve_scene
+from dustfall.stokes.plan import plan_scene
 from dustfall.stokes.references.exact_pairs import forces_on_two_spheres
-from dustfall.stokes.solve import one_body_response, plan_scene, response_rows, solve
+from dustfall.stokes.solve import fixed_spheres, response_rows, solve
 from dustfall.stokes.translation import translation_tables
 from dustfall.units import FORCE_UNIT, RADIUS, STOKES_DRAG
 
@@ -31,8 +33,8 @@ FINE_DEGREE = 72
 """Degree of all pairs in the solve that clusters of more than two spheres are measured against."""
 
 
-def gaps(body: OneBody, tolerances, sizes=(1.0, 0.1, 1e-2, 1e-3, 1e-4), progress=None):
-    """Clusters at gaps [d_p]: cluster, gap, tolerance, order, iterations, seconds, error, ...
+def gaps(tolerances, sizes=(1.0, 0.1, 1e-2, 1e-3, 1e-4), progress=None):
+    """Clusters at gaps [d_p]: cluster, gap, tolerance, degree, iterations, seconds, error, ...
 
     error: largest of all spheres, over 24, against the exact solution for a pair and otherwise
     against a solve with FINE_DEGREE. estimate: the solver's own, largest; status: its word on it.
@@ -48,15 +50,14 @@ def gaps(body: OneBody, tolerances, sizes=(1.0, 0.1, 1e-2, 1e-3, 1e-4), progress
             )
             for tolerance in tolerances:
                 rows.append(
-                    {"test": "gap", "case": name, "value": gap}
-                    | _solved(centres, exact, body, tolerance)
+                    {"test": "gap", "case": name, "value": gap} | _solved(centres, exact, tolerance)
                 )
                 if progress is not None:
                     progress(len(rows), len(CLUSTERS) * len(sizes) * len(tolerances))
     return pd.DataFrame(rows)
 
 
-def distances(body: OneBody, tolerances, values=(10.0, 100.0, 1e3, 1e4)) -> pd.DataFrame:
+def distances(tolerances, values=(10.0, 100.0, 1e3, 1e4)) -> pd.DataFrame:
     """Pairs at large distances [d_p], against the exact solution; columns as in `gaps`."""
     rows = []
     for distance in values:
@@ -64,11 +65,11 @@ def distances(body: OneBody, tolerances, values=(10.0, 100.0, 1e3, 1e4)) -> pd.D
         exact = forces_on_two_spheres(centres, FLOW)
         for tolerance in tolerances:
             row = {"test": "distance", "case": "pair", "value": distance}
-            rows.append(row | _solved(centres, exact, body, tolerance))
+            rows.append(row | _solved(centres, exact, tolerance))
     return pd.DataFrame(rows)
 
 
-def invariances(body: OneBody, tolerances, gap=0.01, seed: int = 1) -> pd.DataFrame:
+def invariances(tolerances, gap=0.01, seed: int = 1) -> pd.DataFrame:
     """Six nearly touching spheres: moved far away, turned, and with two distances almost alike.
 
     error: largest change of a force, over 24, after the change is undone. Turned: largest of 10
@@ -79,10 +80,9 @@ def invariances(body: OneBody, tolerances, gap=0.01, seed: int = 1) -> pd.DataFr
     rng = np.random.default_rng(seed)
     rows = []
     for tolerance in tolerances:
-        response = one_body_response(body, tolerance)
 
-        def forces(places, flow, response=response, tolerance=tolerance):
-            return solve(plan_scene(places, tolerance), response, flow, tolerance).force
+        def forces(places, flow, tolerance=tolerance):
+            return fixed_spheres(places, flow, tolerance).force
 
         base = forces(centres, FLOW)
         for distance in (1e3, 1e6):
@@ -110,10 +110,10 @@ def turned_mesh(edge: float = 0.5, seed: int = 1) -> pd.DataFrame:
     )
 
 
-def condition_numbers(edges=(1.0, 0.7, 0.5, 0.35), sizes=(1.0, 0.1, 1e-2, 1e-3), order=10):
+def condition_numbers(edges=(1.0, 0.7, 0.5, 0.35), sizes=(1.0, 0.1, 1e-2, 1e-3), degree=10):
     """Of the single-layer matrix against edge length [radii], and of two spheres against the gap.
 
-    The latter is that of the preconditioned system which GMRES solves, all degrees up to `order`.
+    The latter is that of the preconditioned system which GMRES solves, all degrees up to `degree`.
     """
     rows = []
     for edge in edges:
@@ -122,7 +122,7 @@ def condition_numbers(edges=(1.0, 0.7, 0.5, 0.35), sizes=(1.0, 0.1, 1e-2, 1e-3),
         matrix = self_interaction(mesh) + np.outer(normals, normals)
         rows.append(("condition, one body", f"{len(mesh.triangles)} elements", edge, matrix))
     for gap in sizes:
-        rows.append(("condition, system", "pair", gap, _pair_system(1.0 + gap, order)))
+        rows.append(("condition, system", "pair", gap, _pair_system(1.0 + gap, degree)))
     return pd.DataFrame(
         [
             {"test": test, "case": case, "value": value, "condition": np.linalg.cond(matrix)}
@@ -133,29 +133,28 @@ def condition_numbers(edges=(1.0, 0.7, 0.5, 0.35), sizes=(1.0, 0.1, 1e-2, 1e-3),
 
 def fine_forces(centres, flow, degree: int) -> np.ndarray:
     """Forces (n, 3) [Re_p c_D] with all degrees up to `degree` on every sphere, no tolerance."""
-    orders = np.full((len(centres), len(centres)), degree)
-    np.fill_diagonal(orders, 0)
+    degrees = np.full((len(centres), len(centres)), degree)
+    np.fill_diagonal(degrees, 0)
     response, tables = response_rows(exact_response(degree)), translation_tables(degree)
     force, _, _ = solve_scene(
-        np.asarray(centres) / RADIUS, np.asarray(flow), orders, response, tables, 1e-11, 600
+        np.asarray(centres) / RADIUS, flow_direction(flow), degrees, response, tables, 1e-11, 600
     )
     return FORCE_UNIT * RADIUS * force
 
 
-def _solved(centres, exact, body, tolerance) -> dict:
-    response = one_body_response(body, tolerance)
+def _solved(centres, exact, tolerance) -> dict:
     start = time.perf_counter()
     plan = plan_scene(centres, tolerance)
-    solution = solve(plan, response, FLOW, tolerance)
+    solution = solve(plan, FLOW, tolerance)
     seconds = time.perf_counter() - start
     return {
         "tolerance": tolerance,
-        "order": plan.orders.max(),
+        "degree": plan.degrees.max(),
         "iterations": solution.iterations,
         "seconds": seconds,
         "error": np.abs(solution.force - exact).max() / STOKES_DRAG,
         "estimate": solution.error_estimate.max(),
-        "status": ("converged", "not converged", "out of reach")[solution.status],
+        "status": str(solution.status),
     }
 
 
@@ -166,14 +165,14 @@ def _change(case, value, tolerance, difference) -> dict:
     }  # fmt: skip
 
 
-def _pair_system(distance, order) -> np.ndarray:
+def _pair_system(distance, degree) -> np.ndarray:
     """Matrix 1 + T K of two spheres at a distance [d_p], column by column."""
-    tables, response = translation_tables(), response_rows(exact_response(order))
-    orders = np.array([[0, order], [order, 0]])
-    scene = couple_scene(distance / RADIUS * CLUSTERS["pair"].astype(float), orders, tables)
+    tables, response = translation_tables(), response_rows(exact_response(degree))
+    degrees = np.array([[0, degree], [degree, 0]])
+    scene = couple_scene(distance / RADIUS * CLUSTERS["pair"].astype(float), degrees, tables)
     columns = []
-    for unit in np.eye(6 * (order + 1) ** 2):
+    for unit in np.eye(6 * (degree + 1) ** 2):
         column = np.empty((len(unit) // 3, 3))
-        apply_system(unit.reshape(-1, 3), scene, orders, response, tables, column)
+        apply_system(unit.reshape(-1, 3), scene, degrees, response, tables, column)
         columns.append(column.ravel())
     return np.array(columns).T

@@ -1,5 +1,6 @@
-"""Forces on fixed spheres in Stokes flow, by boundary elements."""
+"""Forces on fixed spheres in Stokes flow."""
 
-from dustfall.stokes.solve import forces_on_fixed_spheres
+from dustfall.solution import Solution, Status
+from dustfall.stokes.solve import fixed_spheres, forces_on_fixed_spheres
 
-__all__ = ["forces_on_fixed_spheres"]
+__all__ = ["Solution", "Status", "fixed_spheres", "forces_on_fixed_spheres"]

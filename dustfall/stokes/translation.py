@@ -79,12 +79,12 @@ def translation_tables(degree: int = MOST_DEGREE):
 
 
 @njit(cache=True)
-def block_sizes(order):
-    """Number of coefficients of each total azimuthal number M = 0 ... order + 1."""
-    sizes = np.zeros(order + 2, dtype=np.int64)
-    for total in range(order + 2):
+def block_sizes(degree):
+    """Number of coefficients of each total azimuthal number M = 0 ... degree + 1."""
+    sizes = np.zeros(degree + 2, dtype=np.int64)
+    for total in range(degree + 2):
         for step in _COMPONENTS:
-            sizes[total] += max(0, order + 1 - abs(total + step))
+            sizes[total] += max(0, degree + 1 - abs(total + step))
     return sizes
 
 
@@ -109,28 +109,28 @@ def _times(step, m, values, up, down, out):
 
 
 @njit(cache=True)
-def axial_coupling(order, distance, tables):
+def axial_coupling(degree, distance, tables):
     """Matrices of the numbers M = 0, 1, ... of a pair along z, row by row one after the other.
 
     Rows: velocity on the sphere at (0, 0, distance); columns: traction on that at the origin.
     """
     moved, gradient, up, down, _, _, _ = tables
-    sizes = block_sizes(order)
+    sizes = block_sizes(degree)
     out = np.zeros(np.sum(sizes**2))
-    length = order + 3
+    length = degree + 3
     powers = distance ** -np.arange(2.0 * length + 1.0)
     one, source = np.empty(length), np.empty(length)
     phi, psi = np.empty(length), np.empty(length)
     slope, product, velocity = np.empty(length), np.empty(length), np.empty((3, length))
     begin = 0
-    for total in range(order + 2):
+    for total in range(degree + 2):
         size = sizes[total]
         column = 0
         for s in range(3):
             m = total + _COMPONENTS[s]
             # a.b = a_z b_z + (a_+ b_- + a_- b_+) in the scaled components: the partner of s.
             partner = (3 - s) % 3
-            for l in range(abs(m), order + 1):  # noqa: E741
+            for l in range(abs(m), degree + 1):  # noqa: E741
                 one[:] = 0.0
                 one[l] = 1.0
                 _times(partner, m, one, up, down, source)
@@ -154,7 +154,7 @@ def axial_coupling(order, distance, tables):
                     velocity[r] += weight * slope
                 row = 0
                 for r in range(3):
-                    for t in range(abs(total + _COMPONENTS[r]), order + 1):
+                    for t in range(abs(total + _COMPONENTS[r]), degree + 1):
                         out[begin + row * size + column] = velocity[r, t] / (8.0 * np.pi)
                         row += 1
                 column += 1
@@ -163,9 +163,9 @@ def axial_coupling(order, distance, tables):
 
 
 @njit(cache=True)
-def _turned_about_z(order, angle, field):
+def _turned_about_z(degree, angle, field):
     """Turn a vector field, harmonics and components, about z by an angle, in place."""
-    for n in range(1, order + 1):
+    for n in range(1, degree + 1):
         middle = n * n + n
         for m in range(1, n + 1):
             c, s = np.cos(m * angle), np.sin(m * angle)
@@ -174,17 +174,17 @@ def _turned_about_z(order, angle, field):
                 field[middle + m, i] = c * even - s * odd
                 field[middle - m, i] = s * even + c * odd
     c, s = np.cos(angle), np.sin(angle)
-    for k in range((order + 1) ** 2):
+    for k in range((degree + 1) ** 2):
         x, y = field[k, 0], field[k, 1]
         field[k, 0] = c * x - s * y
         field[k, 1] = s * x + c * y
 
 
 @njit(cache=True)
-def _axes_swapped(order, field, tables, out):
+def _axes_swapped(degree, field, tables, out):
     """The field with y and z exchanged, harmonics and components."""
     _, _, _, _, data, indices, begin = tables
-    for k in range((order + 1) ** 2):
+    for k in range((degree + 1) ** 2):
         x = y = z = 0.0
         for p in range(begin[k], begin[k + 1]):
             v, other = data[p], indices[p]
@@ -195,33 +195,33 @@ def _axes_swapped(order, field, tables, out):
 
 
 @njit(cache=True)
-def turn_to_axis(order, polar, azimuth, tables, field, spare):
+def turn_to_axis(degree, polar, azimuth, tables, field, spare):
     """Turn the frame so that the direction (polar, azimuth) becomes z; field (k, 3), in place."""
-    _turned_about_z(order, -azimuth, field)
-    _axes_swapped(order, field, tables, spare)
-    _turned_about_z(order, polar, spare)
-    _axes_swapped(order, spare, tables, field)
+    _turned_about_z(degree, -azimuth, field)
+    _axes_swapped(degree, field, tables, spare)
+    _turned_about_z(degree, polar, spare)
+    _axes_swapped(degree, spare, tables, field)
 
 
 @njit(cache=True)
-def turn_from_axis(order, polar, azimuth, tables, field, spare):
+def turn_from_axis(degree, polar, azimuth, tables, field, spare):
     """Undo `turn_to_axis`."""
-    _axes_swapped(order, field, tables, spare)
-    _turned_about_z(order, -polar, spare)
-    _axes_swapped(order, spare, tables, field)
-    _turned_about_z(order, azimuth, field)
+    _axes_swapped(degree, field, tables, spare)
+    _turned_about_z(degree, -polar, spare)
+    _axes_swapped(degree, spare, tables, field)
+    _turned_about_z(degree, azimuth, field)
 
 
 @njit(cache=True)
-def gather_azimuthal(order, field, out):
+def gather_azimuthal(degree, field, out):
     """Write a field (k, 3) as its azimuthal numbers: out (size, 2), real and imaginary parts.
 
     With F_m = (cosine - i sine) / sqrt 2 for m > 0 and its conjugate for -m.
     """
     half = np.sqrt(0.5)
     p = 0
-    for total in range(order + 2):
-        for n in range(total, order + 1):
+    for total in range(degree + 2):
+        for n in range(total, degree + 1):
             k = n * n + n
             if total == 0:
                 out[p, 0], out[p, 1] = field[k, 2], 0.0
@@ -229,14 +229,14 @@ def gather_azimuthal(order, field, out):
                 out[p, 0], out[p, 1] = half * field[k + total, 2], -half * field[k - total, 2]
             p += 1
         m = total + 1
-        for n in range(m, order + 1):
+        for n in range(m, degree + 1):
             k = n * n + n
             # (F^x + i F^y) / sqrt 2, and F = (c - i s) / sqrt 2.
             out[p, 0] = 0.5 * (field[k + m, 0] + field[k - m, 1])
             out[p, 1] = 0.5 * (field[k + m, 1] - field[k - m, 0])
             p += 1
         m = total - 1
-        for n in range(abs(m), order + 1):
+        for n in range(abs(m), degree + 1):
             k = n * n + n
             if m == 0:
                 out[p, 0], out[p, 1] = half * field[k, 0], -half * field[k, 1]
@@ -250,13 +250,13 @@ def gather_azimuthal(order, field, out):
 
 
 @njit(cache=True)
-def scatter_azimuthal(order, values, field):
+def scatter_azimuthal(degree, values, field):
     """Undo `gather_azimuthal`."""
     half = np.sqrt(0.5)
-    field[: (order + 1) ** 2] = 0.0
+    field[: (degree + 1) ** 2] = 0.0
     p = 0
-    for total in range(order + 2):
-        for n in range(total, order + 1):
+    for total in range(degree + 2):
+        for n in range(total, degree + 1):
             k = n * n + n
             if total == 0:
                 field[k, 2] = values[p, 0]
@@ -265,7 +265,7 @@ def scatter_azimuthal(order, values, field):
                 field[k - total, 2] = -values[p, 1] / half
             p += 1
         m = total + 1
-        for n in range(m, order + 1):
+        for n in range(m, degree + 1):
             k = n * n + n
             field[k + m, 0] += values[p, 0]
             field[k - m, 1] += values[p, 0]
@@ -273,7 +273,7 @@ def scatter_azimuthal(order, values, field):
             field[k - m, 0] -= values[p, 1]
             p += 1
         m = total - 1
-        for n in range(abs(m), order + 1):
+        for n in range(abs(m), degree + 1):
             k = n * n + n
             if m == 0:
                 field[k, 0], field[k, 1] = values[p, 0] / half, -values[p, 1] / half

@@ -6,7 +6,7 @@ Mobilities are in units of an isolated sphere's, lengths in d_p.
 import numpy as np
 from numba import njit
 
-from dustfall.spheres import checked_flow
+from dustfall.spheres import checked_positions, flow_direction
 from dustfall.units import STOKES_DRAG
 
 
@@ -50,19 +50,11 @@ def rotne_prager_forces(centres, flow=(0.0, 1.0, 0.0)) -> np.ndarray:
     the flow.
     Raises ValueError for another shape, a value that is not finite, or coincident centres.
     """
-    centres = np.ascontiguousarray(centres, dtype=float)
-    flow = checked_flow(flow)
-    if centres.ndim != 2 or centres.shape[1] != 3 or len(centres) == 0:
-        raise ValueError(f"centres have shape {centres.shape}; they must be (n, 3) with n >= 1")
-    if not np.isfinite(centres).all():
-        raise ValueError("centres must be finite")
+    centres, flow = checked_positions(centres), flow_direction(flow)
     order = np.lexsort(centres.T)
     same = np.flatnonzero((np.diff(centres[order], axis=0) == 0.0).all(axis=1))
     if len(same):
         i, j = sorted(order[same[0] : same[0] + 2].tolist())
         raise ValueError(f"spheres {i} and {j} have the same centre")
-    speed = np.linalg.norm(flow)
-    if speed == 0.0:
-        return np.zeros_like(centres)
-    velocity = np.tile(flow / speed, len(centres))
+    velocity = np.tile(flow, len(centres))
     return STOKES_DRAG * np.linalg.solve(free_mobility(centres), velocity).reshape(-1, 3)

@@ -8,7 +8,7 @@ pytestmark = pytest.mark.slow
 
 SMOKE = ("--configfile", "config/smoke.yaml")
 
-SHARDS = {"scenes": 5, "meshes": 5, "stokes": 5}
+SHARDS = {"scenes": 5, "stokes": 5}
 DATA_FIGURES = {"figure_force_scatter": 1, "figure_force_pdf": 1, "figure_spearman": 1}
 SCORES = {"evaluation": 1, "figure_predicted_vs_target": 1, "figure_error_by_distance": 1}
 TRIALS = {"trial": 13, "learning_curve": 1, "ablation": 1, "figure_learning_curve": 1}
@@ -76,10 +76,10 @@ def test_bits_of_the_data_hang_neither_on_cores_nor_on_shard_size(campaign, tmp_
         # A fourth shard, and all that hangs on the data set.
         (
             "scenes={number: {uniform: 150}}",
-            {"scenes": 1, "meshes": 1, "stokes": 1} | FROM_DATA,
+            {"scenes": 1, "stokes": 1} | FROM_DATA,
         ),
         ("meshing={study_sizes: [0.9, 0.7, 0.5]}", {"mesh_study": 1, "figure_mesh_study": 1}),
-        ("stokes={tolerance: 1.0e-3}", {"meshes": 5, "stokes": 5} | FROM_DATA),
+        ("stokes={tolerance: 1.0e-3}", {"stokes": 5} | FROM_DATA),
         ("dataset={unconverged_share: 0.02}", FROM_DATA),
         ("dataset={test_share: 0.2}", MODELS | SETTLING),
         (
@@ -132,7 +132,7 @@ def test_an_edited_key_reruns_what_hangs_on_it_and_nothing_else(campaign, settin
     ("file", "expected"),
     [
         ("scenes.py", SHARDS | FROM_DATA),
-        ("stokes/records.py", {"meshes": 5, "stokes": 5} | FROM_DATA),
+        ("stokes/records.py", {"stokes": 5} | FROM_DATA),
         ("dataset.py", FROM_DATA),
         ("training/fit.py", MODELS | SETTLING),
         ("sedimentation/dynamics.py", ALL_SETTLING),

@@ -31,10 +31,7 @@ def test_the_paper_takes_the_expected_jobs_and_fewer_than_a_thousand(project):
     shards = 2 * (14_000 // 2000) + 4_000 // 2000
     expected = {
         "configuration": 1,
-        "templates": 1,
-        "operators": 1,
         "scenes": shards,
-        "meshes": shards,
         "stokes": shards,
         "dataset": 1,
         "data_summary": 1,

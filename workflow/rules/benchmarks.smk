@@ -18,7 +18,6 @@ rule prediction_benchmark:
 rule solver_benchmark:
     """Run time of the Stokes solver, its rungs, references and peers against the error."""
     input:
-        operator=f"results/operators/{TEMPLATE}.h5",
         library=library("solver_benchmark.py"),
     output:
         error="results/benchmarks/solver.csv",
@@ -42,7 +41,6 @@ rule solver_benchmark:
 rule stress:
     """Gaps, distances, turns and condition numbers that strain the solver."""
     input:
-        operator=f"results/operators/{TEMPLATE}.h5",
         library=library("stress.py"),
     output:
         "results/benchmarks/stress.csv",

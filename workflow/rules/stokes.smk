@@ -1,23 +1,7 @@
-rule operators:
-    """Assemble and factor the one-body operator of a template."""
-    input:
-        template="results/templates/sphere-{size}.h5",
-        library=library("one_body.py"),
-    output:
-        "results/operators/sphere-{size}.h5",
-    log:
-        "logs/operators/sphere-{size}.log",
-    benchmark:
-        "benchmarks/operators/sphere-{size}.tsv"
-    script:
-        "../scripts/one_body.py"
-
-
 rule stokes:
-    """Solve the Stokes problem of every scene of a shard."""
+    """Plan and solve the Stokes problem of every scene of a shard."""
     input:
-        meshes="results/meshes/{law}-{shard}.h5",
-        operator=f"results/operators/{TEMPLATE}.h5",
+        scenes="results/scenes/{law}-{shard}.h5",
         library=library("solve.py"),
     output:
         "results/stokes/{law}-{shard}.h5",

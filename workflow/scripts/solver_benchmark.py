@@ -11,7 +11,6 @@ from dustfall.figures.benchmark import solver_benchmark
 from dustfall.figures.style import save
 from dustfall.files import atomic
 from dustfall.scenes import random_scenes
-from dustfall.stokes.elements.one_body import OneBody
 
 progress = joblog.start(snakemake.log[0])
 params = snakemake.params
@@ -26,13 +25,12 @@ for begin, end in pairwise(edges):
 neighbours, _ = random_scenes(params.seed, "contact", range(params.scenes), tuple(edges[-2:]))
 sets["near contact"] = np.concatenate([np.zeros((params.scenes, 1, 3)), neighbours], axis=1)
 
-body = OneBody.load(snakemake.input.operator)
-compared = methods(body, params.tolerances, params.scenes, params.few)
-table = time_against_error(sets, compared, body, progress=progress("benchmark", "rows"))
+compared = methods(params.tolerances, params.scenes, params.few)
+table = time_against_error(sets, compared, progress=progress("benchmark", "rows"))
 print(table.to_string(index=False))
 save(solver_benchmark(table), table, Path(snakemake.output.error).with_suffix(""))
 
-cost = time_against_spheres(params.spheres, body)
+cost = time_against_spheres(params.spheres)
 print(cost.to_string(index=False))
 with atomic(snakemake.output.spheres) as path:
     cost.to_csv(path, index=False)

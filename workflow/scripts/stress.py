@@ -5,16 +5,15 @@ import pandas as pd
 import joblog
 from dustfall.benchmarks import stress
 from dustfall.files import atomic
-from dustfall.stokes.elements.one_body import OneBody
 
 progress = joblog.start(snakemake.log[0])
 
-body, tolerances = OneBody.load(snakemake.input.operator), snakemake.params.tolerances
+tolerances = snakemake.params.tolerances
 table = pd.concat(
     [
-        stress.gaps(body, tolerances, progress=progress("gaps", "solves")),
-        stress.distances(body, tolerances),
-        stress.invariances(body, tolerances),
+        stress.gaps(tolerances, progress=progress("gaps", "solves")),
+        stress.distances(tolerances),
+        stress.invariances(tolerances),
         stress.turned_mesh(),
         stress.condition_numbers(),
     ]

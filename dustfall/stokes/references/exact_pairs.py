@@ -10,6 +10,7 @@ import math
 import numpy as np
 from numba import njit, vectorize
 
+from dustfall.spheres import checked_numbers, flow_direction
 from dustfall.units import STOKES_DRAG
 
 SMALLEST_GAP = 5e-7
@@ -50,23 +51,15 @@ def forces_on_two_spheres(centres, flow=(0.0, 1.0, 0.0)) -> np.ndarray:
     magnitude. Returns (2, 3) in Re_p c_D: an isolated sphere feels 24 along the flow.
     Raises ValueError for other shapes, values that are not finite, and spheres that overlap.
     """
-    centres = np.asarray(centres, dtype=float)
-    flow = np.asarray(flow, dtype=float)
-    if centres.shape != (2, 3) or flow.shape != (3,):
-        raise ValueError(
-            f"centres must have the shape (2, 3) and flow (3,), not {centres.shape}, {flow.shape}"
-        )
-    if not np.isfinite(flow).all():
-        raise ValueError(f"flow must be three finite numbers, not {flow.tolist()}")
+    centres, flow = checked_numbers("centres", centres), flow_direction(flow)
+    if centres.shape != (2, 3):
+        raise ValueError(f"centres must have the shape (2, 3), not {centres.shape}")
     line = centres[1] - centres[0]
     distance = np.linalg.norm(line)
     along, across = pair_drag(distance)
-    speed = np.linalg.norm(flow)
-    if speed == 0.0:
-        return np.zeros((2, 3))
     direction = line / distance
     parallel = direction * (direction @ flow)
-    force = STOKES_DRAG / speed * (along * parallel + across * (flow - parallel))
+    force = STOKES_DRAG * (along * parallel + across * (flow - parallel))
     return np.stack([force, force])
 
 

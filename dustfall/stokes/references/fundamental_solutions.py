@@ -17,6 +17,7 @@ from numba import njit
 from scipy.sparse.linalg import LinearOperator, gmres
 from scipy.spatial.distance import cdist
 
+from dustfall.spheres import checked_centres, checked_tolerance, flow_direction
 from dustfall.units import STOKES_DRAG
 
 LADDER = [round(200 * 1.5**k) for k in range(9)]
@@ -62,9 +63,8 @@ def reference_forces(centres, flow=(0.0, 1.0, 0.0), tolerance: float = 1e-8):
     Raises ValueError if shapes are wrong, values are not finite, spheres overlap or touch, or the
     tolerance is out of range.
     """
-    centres, flow = _checked(centres, flow)
-    if not 1e-12 <= tolerance <= 0.1:
-        raise ValueError(f"tolerance {tolerance}: allowed are 1e-12 to 0.1")
+    centres, flow = checked_centres(centres), flow_direction(flow)
+    tolerance = checked_tolerance(tolerance, 1e-12, 0.1)
     if not np.any(flow):
         return np.zeros_like(centres), 0.0
     rungs = _rungs(centres, tolerance)
@@ -128,7 +128,7 @@ def solve_with(number: int, centres, flow, goal: float = 1e-13) -> Solution:
     singular basis of its own operator: they are of the size of the velocities, while the forces
     can be a million times larger.
     """
-    flow = flow / np.linalg.norm(flow)
+    flow = flow_direction(flow)
     sphere = _one_sphere(number)
     n = len(centres)
     forces = sphere.forces.reshape(-1, 3)
@@ -258,23 +258,3 @@ def _add_stokeslets(points, places, strengths, velocity):
         velocity[i, 0] += u / (8.0 * np.pi)
         velocity[i, 1] += v / (8.0 * np.pi)
         velocity[i, 2] += w / (8.0 * np.pi)
-
-
-def _checked(centres, flow):
-    centres = np.array(centres, dtype=float)
-    flow = np.array(flow, dtype=float)
-    if centres.ndim != 2 or centres.shape[1] != 3 or len(centres) == 0:
-        raise ValueError(f"centres must have the shape (n, 3) with n >= 1, not {centres.shape}")
-    if flow.shape != (3,) or not np.isfinite(flow).all():
-        raise ValueError(f"flow must be three finite numbers, not {flow.tolist()}")
-    if not np.isfinite(centres).all():
-        sphere = np.flatnonzero(~np.isfinite(centres).all(axis=1))[0]
-        raise ValueError(f"centre of sphere {sphere} is not finite: {centres[sphere].tolist()}")
-    distance = cdist(centres, centres) + np.diag(np.full(len(centres), np.inf))
-    i, j = np.unravel_index(distance.argmin(), distance.shape)
-    if distance[i, j] <= 1.0:
-        raise ValueError(
-            f"spheres {i} and {j} overlap or touch: their centres are {distance[i, j]:.6g} d_p "
-            "apart, more than 1 is needed"
-        )
-    return centres, flow

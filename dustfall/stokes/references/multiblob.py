@@ -11,7 +11,8 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import brentq
 from scipy.spatial import ConvexHull
 
-from dustfall.units import STOKES_DRAG
+from dustfall.spheres import checked_centres, flow_direction
+from dustfall.units import RADIUS, STOKES_DRAG
 
 
 @cache
@@ -91,11 +92,12 @@ def _radii(subdivisions: int) -> tuple[float, float]:
 def multiblob_forces(centres, subdivisions: int, flow=(0.0, 1.0, 0.0)) -> np.ndarray:
     """Force on each of n fixed spheres in a uniform flow, (n, 3) [Re_p c_D].
 
-    centres: (n, 3) [d_p]. subdivisions: 0, 1, 2 for 12, 42, 162 blobs a sphere. The flow has unit
-    magnitude. Raises numpy.linalg.LinAlgError where blobs of two spheres come so close that their
+    centres: (n, 3) [d_p]. subdivisions: 0, 1, 2 for 12, 42, 162 blobs a sphere. flow: (3,), its
+    magnitude makes forces dimensionless. Raises ValueError for centres or a flow that are refused
+    everywhere, and numpy.linalg.LinAlgError where blobs of two spheres come so close that their
     mobility is not positive definite.
     """
     size, blob = _radii(subdivisions)
-    spheres = 2.0 * np.asarray(centres, dtype=float)
-    force = _forces(spheres, size * shell(subdivisions), blob, np.asarray(flow, dtype=float))
+    spheres = checked_centres(centres) / RADIUS
+    force = _forces(spheres, size * shell(subdivisions), blob, flow_direction(flow))
     return STOKES_DRAG / (6.0 * np.pi) * force

@@ -6,7 +6,6 @@ import pytest
 from dustfall.stokes.elements.mesh import sphere_mesh
 from dustfall.stokes.elements.one_body import RESPONSE_DEGREE, OneBody
 from dustfall.stokes.harmonics import single_layer_spectrum
-from dustfall.stokes.solve import one_body_response
 from dustfall.units import FORCE_UNIT
 
 SIZES = (0.7, 0.5, 0.35)
@@ -42,21 +41,6 @@ def test_drag_converges_to_stokes_drag(bodies):
     assert errors[1] < 1e-7
     assert errors[2] < 1e-8
     assert len(bodies[2].mesh.triangles) <= 320
-
-
-def test_degrees_that_the_mesh_does_not_resolve_come_from_the_spectrum(bodies):
-    taken = [len(one_body_response(bodies[2], t).deviation) for t in (1e-2, 1e-4, 1e-6, 1e-8)]
-    assert taken[0] == RESPONSE_DEGREE + 1
-    assert taken == sorted(taken, reverse=True)
-    assert taken[-1] < taken[0]
-    for tolerance in (1e-2, 1e-4, 1e-6, 1e-8):
-        assert one_body_response(bodies[1], tolerance).error(gap=1e-3) <= 0.12 * tolerance
-
-
-def test_a_mesh_that_is_no_sphere_is_refused(bodies):
-    wrong = OneBody(bodies[0].mesh, bodies[0].factor, 1.01 * bodies[0].response)
-    with pytest.raises(ValueError, match="off for a lone sphere"):
-        one_body_response(wrong, 1e-4)
 
 
 def test_saved_operator_comes_back_bit_for_bit(bodies, tmp_path):
