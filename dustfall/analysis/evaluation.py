@@ -29,8 +29,8 @@ def prediction_columns(models: Iterable[str]) -> dict[str, Column]:
 def scores(predictions: Mapping[str, np.ndarray], test: Dataset) -> pd.DataFrame:
     """Tabulate R^2, RMS and largest error of each model, by radial law and decade of phi.
 
-    predictions: name -> force (m, 3) [Re_p c_D] on the scenes of `test`, whose neighbours every model
-    is given in the same, random order (`dataset.split`): none is told more than another.
+    predictions: name -> force (m, 3) [Re_p c_D] on the scenes of `test`. Every model is given the
+    neighbours in the order of `test`, which `dataset.split` makes random: none is told more.
 
     Returns the columns model, component, radial_law, phi_low, phi_high, samples, r2 (of both
     components of "lateral" together; NaN where the force does not vary), rms_error and
