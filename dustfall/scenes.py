@@ -48,14 +48,17 @@ def random_scene(seed: int, law: str, number: int, phi_range) -> tuple[np.ndarra
     phi = float(np.exp(rng.uniform(np.log(low), np.log(high))))
     d5 = float(fifth_distance(phi))
     placed = [np.zeros(3), d5 * _direction(rng)]
-    if law == "contact":
-        placed.append((1.0 + rng.uniform(*NEAR_CONTACT)) * _direction(rng))
     draws = 0
     while len(placed) <= NEIGHBOURS:
         draws += 1
         if draws > _MOST_DRAWS:
             raise ValueError(f"scene {number}: no room for five neighbours at phi = {phi:.3g}")
-        radius = np.cbrt(rng.uniform(1.0, d5**3)) if law == "ball" else rng.uniform(1.0, d5)
+        if law == "contact" and len(placed) == 2:
+            radius = 1.0 + rng.uniform(*NEAR_CONTACT)
+        elif law == "ball":
+            radius = np.cbrt(rng.uniform(1.0, d5**3))
+        else:
+            radius = rng.uniform(1.0, d5)
         candidate = radius * _direction(rng)
         if all(np.sum((candidate - other) ** 2) > 1.0 for other in placed):
             placed.append(candidate)

@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from dustfall.analysis.distributions import COMPONENTS
 from dustfall.forces.frames import check_neighbours, spherical_coordinates
+from dustfall.units import AXES, COMPONENTS
 
 COORDINATES = {
     "spherical": ("radial", "azimuthal", "polar"),
@@ -38,9 +38,11 @@ def spearman_by_neighbours(neighbours, force, coordinates="spherical") -> pd.Dat
     if coordinates not in COORDINATES:
         raise ValueError(f"coordinates are {coordinates!r}; allowed: {', '.join(COORDINATES)}")
     values = spherical_coordinates(neighbours) if coordinates == "spherical" else neighbours
-    rho = _rank_correlation(values.reshape(samples, -1), force).reshape(-1, 3, 3)
-    if not np.isfinite(rho).all():
+    values = values.reshape(samples, -1)
+    if (np.ptp(values, axis=0) == 0).any() or (np.ptp(force, axis=0) == 0).any():
         raise ValueError("a coordinate or force component is the same in all samples: no rank")
+    rho = stats.spearmanr(values, force).statistic[: values.shape[1], values.shape[1] :]
+    rho = rho.reshape(-1, 3, 3)
     mean = np.abs(rho).cumsum(axis=0) / np.arange(1, len(rho) + 1)[:, None, None]
     rows = [
         {
@@ -53,32 +55,27 @@ def spearman_by_neighbours(neighbours, force, coordinates="spherical") -> pd.Dat
             "noise": np.sqrt(2 / (np.pi * (samples - 1))),
             "samples": samples,
         }
-        for component, column in COMPONENTS.items()
+        for component, column in AXES.items()
         for i, name in enumerate(COORDINATES[coordinates])
         for k in range(len(rho))
     ]
     return pd.DataFrame(rows)
 
 
-def _rank_correlation(a, b):
-    """Spearman's coefficients (p, q) between the columns of a (m, p) and b (m, q)."""
-    a, b = (stats.rankdata(x, axis=0) - (len(x) + 1) / 2 for x in (a, b))
-    with np.errstate(invalid="ignore"):
-        return (a.T @ b) / np.sqrt((a**2).sum(axis=0)[:, None] * (b**2).sum(axis=0))
-
-
 def coefficient_of_determination(target, predicted) -> float:
-    """R^2 = 1 - sum of squared errors / sum of squared deviations of the target from its mean.
+    """R^2 = 1 - mean squared error / variance of the target, over all components together.
+
+    The variance is that about one mean of all components. The square of a correlation, which SciPy
+    gives, would forgive a prediction its wrong level and scale.
 
     Raises ValueError for different shapes or a target without variance.
     """
     target, predicted = np.asarray(target, dtype=float), np.asarray(predicted, dtype=float)
     if target.shape != predicted.shape:
         raise ValueError(f"target has shape {target.shape}, prediction {predicted.shape}")
-    deviation = np.sum((target - target.mean()) ** 2) if target.size else 0.0
-    if deviation == 0:
+    if target.size == 0 or np.ptp(target) == 0:
         raise ValueError("the target has no variance: R^2 is not defined")
-    return float(1 - np.sum((target - predicted) ** 2) / deviation)
+    return float(1 - np.mean((target - predicted) ** 2) / target.var())
 
 
 def predictions_against_target(target, predictions, number=1000) -> pd.DataFrame:
@@ -105,7 +102,7 @@ def predictions_against_target(target, predictions, number=1000) -> pd.DataFrame
             raise ValueError(
                 f"predictions of {model} have shape {predicted.shape}; finite {target.shape} needed"
             )
-        for component, columns in {"streamwise": [1], "lateral": [0, 2]}.items():
+        for component, columns in COMPONENTS.items():
             x, y = target[:, columns].ravel(), predicted[:, columns].ravel()
             kept = np.arange(len(x))
             if len(x) > number:

@@ -1,6 +1,5 @@
-"""How well force models predict: scores, errors near contact, broken symmetries, cost."""
+"""How well force models predict: scores, errors near contact, broken symmetries."""
 
-import time
 from collections.abc import Iterable, Mapping
 
 import numpy as np
@@ -30,7 +29,8 @@ def prediction_columns(models: Iterable[str]) -> dict[str, Column]:
 def scores(predictions: Mapping[str, np.ndarray], test: Dataset) -> pd.DataFrame:
     """Tabulate R^2, RMS and largest error of each model, by radial law and decade of phi.
 
-    predictions: name -> force (m, 3) [Re_p c_D] on the scenes of `test`.
+    predictions: name -> force (m, 3) [Re_p c_D] on the scenes of `test`. Every model is given the
+    neighbours in the order of `test`, which `dataset.split` makes random: none is told more.
 
     Returns the columns model, component, radial_law, phi_low, phi_high, samples, r2 (of both
     components of "lateral" together; NaN where the force does not vary), rms_error and
@@ -125,14 +125,3 @@ def symmetry_violations(models, neighbours: np.ndarray) -> pd.DataFrame:
                 }
             )
     return pd.DataFrame(rows)
-
-
-def prediction_cost(model, neighbours: np.ndarray, repetitions: int = 5) -> float:
-    """Processor time of a prediction [microseconds a scene], the best of some repetitions."""
-    model.predict(neighbours[:1])
-    best = np.inf
-    for _ in range(repetitions):
-        start = time.process_time()
-        model.predict(neighbours)
-        best = min(best, time.process_time() - start)
-    return 1e6 * best / len(neighbours)

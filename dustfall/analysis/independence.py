@@ -4,7 +4,8 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from dustfall.analysis.settling import FEWEST_SEEDS, PARTICLE_MEANS
+from dustfall.analysis.settling import PARTICLE_MEANS
+from dustfall.analysis.time_averages import FEWEST_SEEDS
 
 
 def welch_anova(means, errors, freedoms) -> tuple[float, float, float, float]:

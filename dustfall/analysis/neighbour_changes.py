@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from dustfall.analysis.settling import CASE, case_of, from_time, mean_with_interval
+from dustfall.analysis.settling import CASE, case_of, from_time
+from dustfall.analysis.time_averages import mean_with_interval
 
 
 def neighbour_changes(runs: Iterable[xr.Dataset], start: float) -> pd.DataFrame:

@@ -1,6 +1,5 @@
 """Numbers of others that the figures show beside ours, each with its source."""
 
-import numpy as np
 import pandas as pd
 
 PAPER_MESH_STUDY = pd.DataFrame(
@@ -12,46 +11,45 @@ PAPER_MESH_STUDY = pd.DataFrame(
 """Force on an isolated sphere [Re_p c_D] against the nodes of sphere and outer sphere together
 (paper, figure of the mesh validation study, read from the points that its source lists)."""
 
-PAPER_STEADY_STATE = pd.DataFrame(
-    {
-        "volume_fraction": [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8],
-        "value": [1.39, 1.18, 1.08, 1.015, 1.015, 1.015],
-        "low": [np.nan, np.nan, np.nan, 1.01, 1.01, 1.01],
-        "high": [np.nan, np.nan, np.nan, 1.02, 1.02, 1.02],
-    }
+PAPER_SETTLING = pd.DataFrame(
+    [
+        ("inverse_beta", 1e-3, 1.39, ">=", "tip of a drawn arrow that stops short of its point"),
+        ("inverse_beta", 1e-4, 1.1835, "=", "coordinate of a drawn point"),
+        ("inverse_beta", 1e-5, 1.0826, "=", "coordinate of a drawn point"),
+        ("voronoi_variance", 1e-3, 1.2381, "=", "coordinate of a drawn point"),
+        (
+            "voronoi_variance",
+            1e-4,
+            1.04,
+            "<=",
+            "tip of a drawn arrow that stops short of its point",
+        ),
+        (
+            "voronoi_variance",
+            1e-5,
+            0.97,
+            "<=",
+            "tip of a drawn arrow that stops short of its point",
+        ),
+    ],
+    columns=["quantity", "volume_fraction", "value", "relation", "origin"],
 )
-"""Settling velocity in units of the Stokes velocity in the steady state (paper, figures of
-1/beta against phi and of the Voronoï variance; at and below 1e-6 it states a range)."""
-
-RANDOM_START = pd.DataFrame(
-    {
-        "volume_fraction": [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8],
-        "value": [1.458, 1.204, 1.094, 1.043, 1.020, 1.009],
-    }
-)
-"""Mean of 1/beta over 3,000 random (Poisson) five-neighbour environments with the drag of the
-inverted Rotne-Prager mobility of the six spheres."""
+"""What the paper's figures of 1/beta and of the Voronoï variance hold: the settling velocity in
+units of the Stokes velocity, and the variance of V/mean(V) over k theta^2 = 0.2, in the steady
+state. They are drawn by hand: numbers of four digits are data, round ones are where arrows end, and
+bound the value (`relation`). Below 1e-5 there are labels and arrows, and no point with a source."""
 
 BATCHELOR_COEFFICIENT = -6.55
 """Settling velocity of a dilute random suspension is 1 + this times phi (Batchelor 1972)."""
 
-DEL_BELLO = {"volume_fraction": 1e-3, "value": 4.0, "low": 1.0, "high": 4.0}
-"""Volcanic ash (125 to 500 micrometres) in air, in the laboratory and in two- and four-way coupled
-simulations, phi = 1e-7 to 1e-3: particles that settle together exceed a lone one's velocity by up
-to 4 times at phi of about 1e-3 (Del Bello et al. 2017, doi:10.1038/srep39620, abstract)."""
+DEL_BELLO = {"volume_fraction": 1e-3, "low": 1.0, "high": 4.0}
+"""Range, and no points, as these are not published. Volcanic ash (125 to 500 micrometres) in air,
+in the laboratory and in two- and four-way coupled simulations, phi = 1e-7 to 1e-3: particles that
+settle together exceed a lone one's velocity by up to 4 times at phi of about 1e-3 (Del Bello et al.
+2017, doi:10.1038/srep39620, abstract)."""
 
 POISSON_VORONOI_VARIANCE = 0.179032
 """Variance of V/mean(V) of the Voronoï cells of random points (integral of Gilbert 1962)."""
-
-PAPER_VORONOI_VARIANCE = pd.DataFrame(
-    {
-        "volume_fraction": [1e-3, 1e-4, 1e-5, 1e-6],
-        "inverse_beta": [1.39, 1.1835, 1.0826, 1.01],
-        "variance": [1.2381, 1.04, 0.97, 0.97],
-    }
-)
-"""Variance of V/mean(V) over k theta^2 = 0.2 against 1/beta (paper, figure of the Voronoï variance,
-read from the arrows that point at its data; the last stands for all below 1e-6)."""
 
 PAPER_GAMMA = (5.0, 0.2)
 """Shape k and scale theta of the gamma law of the paper; k = (3 d + 1)/2 in d = 3 dimensions

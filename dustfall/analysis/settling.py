@@ -1,31 +1,25 @@
 """Settling velocity of the cloud: time series, steady state with interval, tracked particles."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import xarray as xr
-from scipy import stats
 
-from dustfall.analysis.references import (
-    BATCHELOR_COEFFICIENT,
-    DEL_BELLO,
-    PAPER_STEADY_STATE,
-    RANDOM_START,
+from dustfall.analysis.references import BATCHELOR_COEFFICIENT, DEL_BELLO, PAPER_SETTLING
+from dustfall.analysis.time_averages import (
+    ROUNDING,
+    Mean,
+    drift,
+    drift_of_runs,
+    mean_of_runs,
+    mean_with_interval,
 )
+from dustfall.units import SPHERE_VOLUME
 
 CASE = ("model", "n", "volume_fraction", "galileo")
 """Attributes that tell one case from another; runs that share them differ by their seed."""
-
-FEWEST_BATCHES = 5
-MOST_BATCHES = 30
-BATCH_LENGTH = 4
-"""Length of a batch in correlation lengths: with it and at least five batches, 95 % intervals of
-autoregressive series of 10 to 1,000 correlation times hold the true mean in 92 to 96 % of cases."""
-
-FEWEST_SEEDS = 3
-"""From this many independent runs on, the spread between them gives the interval."""
 
 PARTICLE_MEANS = ("settling_velocity_mean", "inverse_beta_mean")
 """Series that are means over particles of something that spreads like the settling velocity."""
@@ -34,81 +28,18 @@ SHARED_NEIGHBOURS = 1.3
 """Particles share neighbours, so the mean over n random ones spreads more than by 1/sqrt(n): 1.02
 (phi = 1e-3) to 1.33 times (1e-8) as much, over 150 to 400 random starts of 200 and 1,000."""
 
+STEADY, DRIFTING, TOO_SHORT = "steady", "drifting", "too short"
+"""What the averaging window of a case shows: see `steadiness`."""
 
-@dataclass(frozen=True)
-class Mean:
-    """A mean with its standard error, the degrees of freedom behind it, and its interval."""
+AVERAGES = ("value", "low", "high", "standard_error", "degrees_of_freedom")
+"""Columns that a case without a steady state has no numbers in."""
 
-    value: float
-    standard_error: float
-    degrees_of_freedom: float
-    correlation_length: float
-    confidence: float = 0.95
+DRIFT_LEVEL = 0.05
+"""Probability that a steady case is taken for a drifting one, over both series that are tested."""
 
-    @property
-    def half_width(self) -> float:
-        """Half the width of the confidence interval (Student's t)."""
-        return float(
-            stats.t.ppf(0.5 + self.confidence / 2, self.degrees_of_freedom) * self.standard_error
-        )
-
-
-def correlation_length(values) -> float:
-    """Samples of an evenly sampled series (m,) that count for one independent sample.
-
-    1 + 2 times the sum of the autocorrelation, summed up to five times itself (Sokal 1997); one
-    for uncorrelated or constant series.
-    """
-    x = np.asarray(values, dtype=float)
-    x = x - x.mean()
-    if x.size < 2 or not x.any():
-        return 1.0
-    spectrum = np.fft.rfft(x, 2 * x.size)
-    autocorrelation = np.fft.irfft(spectrum * spectrum.conj())[: x.size]
-    length = 2 * np.cumsum(autocorrelation / autocorrelation[0]) - 1
-    closed = np.flatnonzero(np.arange(x.size) >= 5 * length)
-    return float(max(1.0, length[closed[0]] if closed.size else length.max()))
-
-
-def mean_with_interval(values, confidence=0.95) -> Mean:
-    """Mean of a correlated, evenly sampled series (m,) with an honest interval, by batch means.
-
-    The series is cut into 5 to 30 batches of at least four correlation lengths where it is long
-    enough; the spread of the batch means gives the standard error, and Student's t with one degree
-    of freedom less than batches the interval.
-
-    Raises ValueError for fewer than ten values or values that are not finite.
-    """
-    x = np.asarray(values, dtype=float)
-    if x.ndim != 1 or x.size < 2 * FEWEST_BATCHES:
-        raise ValueError(
-            f"a series of shape {x.shape} has no interval; at least {2 * FEWEST_BATCHES} values"
-        )
-    if not np.isfinite(x).all():
-        raise ValueError(f"value {int(np.flatnonzero(~np.isfinite(x))[0])} is not finite")
-    length = correlation_length(x)
-    batches = int(np.clip(x.size / (BATCH_LENGTH * length), FEWEST_BATCHES, MOST_BATCHES))
-    size = x.size // batches
-    means = x[x.size - batches * size :].reshape(batches, size).mean(axis=1)
-    error = means.std(ddof=1) / np.sqrt(batches)
-    return Mean(float(x.mean()), float(error), batches - 1, length, confidence)
-
-
-def mean_of_runs(means: list[Mean]) -> Mean:
-    """Combine the means of independent runs of one case.
-
-    From three runs on, the spread between runs gives the standard error; below that, the errors
-    within the runs do.
-    """
-    k = len(means)
-    values = np.array([m.value for m in means])
-    if k >= FEWEST_SEEDS:
-        error, freedom = values.std(ddof=1) / np.sqrt(k), k - 1
-    else:
-        error = np.sqrt(sum(m.standard_error**2 for m in means)) / k
-        freedom = sum(m.degrees_of_freedom for m in means)
-    length = float(np.mean([m.correlation_length for m in means]))
-    return Mean(float(values.mean()), float(error), freedom, length, means[0].confidence)
+SHORTEST_WINDOW = 1.0
+"""Mean spacings that particles must move relative to the cloud within a window: before that most
+keep the neighbours of their random start, and a mean that does not drift is that of the start."""
 
 
 def case_of(dataset: xr.Dataset) -> dict:
@@ -154,89 +85,164 @@ def settling_velocities(trajectory: xr.Dataset, start: float) -> tuple[np.ndarra
     return -part["velocities"][:, :, 2].values.astype(float), even_interval(part["time"])
 
 
-def steady_state(
-    runs: Iterable[xr.Dataset], start: float, quantity="settling_velocity_mean", confidence=0.95
-) -> pd.DataFrame:
-    """Average a series quantity from `start` on, with a confidence interval, for each case.
+def stokes_number(run: xr.Dataset) -> float:
+    """v_s tau / d_p of a run; ValueError where it has none."""
+    if "stokes_number" not in run.attrs:
+        raise ValueError("the dataset lacks the attribute 'stokes_number'")
+    return float(run.attrs["stokes_number"])
 
-    Parameters: `runs`, series datasets (dimension step; variables time [tau] and `quantity`;
-    attributes model, n, volume_fraction, galileo), `start` [tau]. Runs of one case that differ by
-    seed are combined: from three on by the spread between them, below that by the error within
-    each (`mean_of_runs`). Within a run it comes from batch means (`mean_with_interval`). A dilute
-    cloud keeps its random start for the whole run, though, and time tells nothing of how another
-    start would settle; so for means over particles the error is at least that of a mean over n
-    particles with the measured variance.
 
-    Returns the columns model, n, volume_fraction, galileo, quantity, value, low, high,
-    standard_error, degrees_of_freedom, correlation_time [tau], runs; sorted.
+def steadiness(windows: Sequence[xr.Dataset]) -> tuple[str, float]:
+    """Whether the runs of a case are steady: their averaging windows, series datasets, tell.
 
-    Raises ValueError where the series lacks the quantity, an attribute, or ten steps after `start`.
+    Returns `STEADY`, `DRIFTING` or `TOO_SHORT`, and how many mean spacings of the cloud a particle
+    of one standard deviation in velocity moves through it within the window. With fewer than
+    `SHORTEST_WINDOW` it is too short, whatever the series look like: time in a dilute cloud is
+    counted in these, not in response times. Otherwise a case drifts where mean or variance of
+    the settling velocity change along the window (`time_averages.drift`), each at half of
+    `DRIFT_LEVEL` (Bonferroni). A cloud whose particles all have one velocity is steady.
     """
-    cases: dict[tuple, list[tuple[Mean, float]]] = {}
+    variance = np.mean([float(window["settling_velocity_variance"].mean()) for window in windows])
+    mean = np.mean([float(window["settling_velocity_mean"].mean()) for window in windows])
+    spread = np.sqrt(max(variance, 0.0))
+    spacing = np.cbrt(SPHERE_VOLUME / case_of(windows[0])["volume_fraction"])
+    duration = np.mean([np.ptp(window["time"].values) for window in windows])
+    moved = float(spread * stokes_number(windows[0]) * duration / spacing)
+    if spread <= ROUNDING * abs(mean):
+        return STEADY, moved
+    if moved < SHORTEST_WINDOW:
+        return TOO_SHORT, moved
+    tested = ("settling_velocity_mean", "settling_velocity_variance")
+    drifts = [drift_of_runs([drift(w[name].values) for w in windows]) for name in tested]
+    drifting = any(d.p_value < DRIFT_LEVEL / len(tested) for d in drifts)
+    return (DRIFTING if drifting else STEADY), moved
+
+
+def steady_state(
+    runs: Iterable[xr.Dataset],
+    start: float,
+    quantities: Sequence[str] = ("settling_velocity_mean",),
+    confidence=0.95,
+) -> pd.DataFrame:
+    """Average series quantities from `start` on, with confidence intervals, for each steady case.
+
+    Parameters: `runs`, series datasets (dimension step; variables time [tau], the mean and
+    variance of the settling velocity, and `quantities`; attributes model, n, volume_fraction,
+    galileo, stokes_number), `start` [tau]. Runs of one case that differ by seed are combined: from
+    three on by the spread between them, below that by the error within each (`mean_of_runs`).
+    Within a run it comes from batch means (`mean_with_interval`). A dilute cloud keeps its random
+    start for the whole run, though, and time tells nothing of how another start would settle; so
+    for means over particles the error is at least that of a mean over n particles with the
+    measured variance.
+
+    Returns the columns model, n, volume_fraction, galileo, quantity, status (`steadiness`), value,
+    low, high, standard_error, degrees_of_freedom, correlation_time [tau], first (at the first
+    step of the runs, before the particles move), end and drift (of the line fitted to the window:
+    its last value, and its change over the window), drift_error (standard error), spacings (moved
+    within the window), runs; sorted by quantity and case. A case that is not steady has no
+    average: value, low, high, standard_error and degrees_of_freedom are NaN.
+
+    Raises ValueError where a series lacks a quantity, an attribute, or ten steps after `start`.
+    """
+    cases: dict[tuple, list[xr.Dataset]] = {}
     for run in runs:
-        if quantity not in run:
-            raise ValueError(f"the series has no variable {quantity!r}; it has {sorted(run)}")
-        part = from_time(run, start, "step")
-        mean = mean_with_interval(part[quantity].values, confidence)
-        if quantity in PARTICLE_MEANS:
-            variance = float(part["settling_velocity_variance"].mean())
-            spread = SHARED_NEIGHBOURS * np.sqrt(variance / case_of(run)["n"])
-            if spread > mean.standard_error:
-                freedom = case_of(run)["n"] - 1
-                mean = replace(mean, standard_error=spread, degrees_of_freedom=freedom)
-        time = part["time"].values.astype(float)
-        interval = (time[-1] - time[0]) / (len(time) - 1)
-        cases.setdefault(tuple(case_of(run).values()), []).append((mean, interval))
+        for quantity in quantities:
+            if quantity not in run:
+                raise ValueError(f"the series has no variable {quantity!r}; it has {sorted(run)}")
+        cases.setdefault(tuple(case_of(run).values()), []).append(run)
     if not cases:
         raise ValueError("there are no runs: at least one series is needed")
     rows = []
-    for case, entries in sorted(cases.items()):
-        mean = mean_of_runs([m for m, _ in entries])
-        rows.append(
-            dict(zip(CASE, case, strict=True))
-            | {
-                "quantity": quantity,
+    for case, own in sorted(cases.items()):
+        windows = [from_time(run, start, "step") for run in own]
+        status, spacings = steadiness(windows)
+        for quantity in quantities:
+            means = [_mean(window, quantity, confidence) for window in windows]
+            trend = drift_of_runs([drift(window[quantity].values) for window in windows])
+            mean = mean_of_runs(means)
+            row = dict(zip(CASE, case, strict=True)) | {"quantity": quantity, "status": status}
+            row |= {
                 "value": mean.value,
                 "low": mean.value - mean.half_width,
                 "high": mean.value + mean.half_width,
                 "standard_error": mean.standard_error,
                 "degrees_of_freedom": mean.degrees_of_freedom,
-                "correlation_time": float(
-                    np.mean([m.correlation_length * dt for m, dt in entries])
-                ),
-                "runs": len(entries),
             }
-        )
-    return pd.DataFrame(rows)
+            if status != STEADY:
+                row |= dict.fromkeys(AVERAGES, np.nan)
+            rows.append(
+                row
+                | {
+                    "correlation_time": float(
+                        np.mean(
+                            [
+                                m.correlation_length * even_interval(window["time"])
+                                for m, window in zip(means, windows, strict=True)
+                            ]
+                        )
+                    ),
+                    "first": float(np.mean([run[quantity].values[0] for run in own])),
+                    "end": trend.end,
+                    "drift": trend.change,
+                    "drift_error": trend.standard_error,
+                    "spacings": spacings,
+                    "runs": len(own),
+                }
+            )
+    table = pd.DataFrame(rows)
+    order = table["quantity"].map(list(quantities).index)
+    return table.iloc[np.argsort(order, kind="stable")].reset_index(drop=True)
+
+
+def _mean(window: xr.Dataset, quantity: str, confidence: float) -> Mean:
+    """Mean of one run over its window, whose error covers that of its random start."""
+    mean = mean_with_interval(window[quantity].values, confidence)
+    if quantity not in PARTICLE_MEANS:
+        return mean
+    variance = float(window["settling_velocity_variance"].mean())
+    particles = case_of(window)["n"]
+    spread = SHARED_NEIGHBOURS * np.sqrt(variance / particles)
+    if spread <= mean.standard_error:
+        return mean
+    return replace(mean, standard_error=spread, degrees_of_freedom=particles - 1)
 
 
 def inverse_beta_table(steady: pd.DataFrame) -> pd.DataFrame:
-    """Put the steady settling velocities beside the paper's, the random start and Batchelor's law.
+    """Put the settling velocities beside the paper's, the random start and Batchelor's law.
 
-    Parameters: `steady` as `steady_state` returns it; the rows of the lowest Galileo number of
-    each (model, n, phi) are kept. Returns the columns source, model, n, volume_fraction, value,
-    low, high, runs, with source "simulation", "paper", "random start", "Batchelor 1972" or "Del
-    Bello 2017".
+    Parameters: `steady` as `steady_state` returns it, with the quantities settling_velocity_mean
+    and inverse_beta_mean; the rows of the lowest Galileo number of each (model, n, phi) are kept.
+
+    Returns the columns source, model, n, volume_fraction, value, low, high, status, drift,
+    relation, runs. Sources: "simulation" (settling velocity; of a case that is not steady its end
+    and its drift, without an interval), "random start" (mean of 1/beta before the particles move),
+    "paper" (relation "=", or ">=" where it states a bound), "Batchelor 1972", and "Del Bello
+    2017", a range.
 
     Raises ValueError for an empty table.
     """
     if steady.empty:
         raise ValueError("the table of steady states is empty")
-    kept = steady.sort_values("galileo").drop_duplicates(["model", "n", "volume_fraction"])
-    simulation = kept.sort_values(["model", "n", "volume_fraction"]).assign(source="simulation")
+    key = ["model", "n", "volume_fraction"]
+    kept = steady.sort_values("galileo").drop_duplicates(["quantity", *key]).sort_values(key)
+    simulation = kept[kept["quantity"] == "settling_velocity_mean"]
+    start = kept[kept["quantity"] == "inverse_beta_mean"]
     phi = np.logspace(-8, -3, 51)
     batchelor = pd.DataFrame({"volume_fraction": phi, "value": 1 + BATCHELOR_COEFFICIENT * phi})
+    paper = PAPER_SETTLING[PAPER_SETTLING["quantity"] == "inverse_beta"]
+    steady_value = simulation["value"].fillna(simulation["end"])
     table = pd.concat(
         [
-            simulation,
-            PAPER_STEADY_STATE.assign(source="paper"),
-            RANDOM_START.assign(source="random start"),
+            simulation.assign(source="simulation", value=steady_value),
+            start[[*key, "runs"]].assign(source="random start", value=start["first"]),
+            paper.assign(source="paper"),
             batchelor.assign(source="Batchelor 1972"),
             pd.DataFrame([DEL_BELLO]).assign(source="Del Bello 2017"),
         ],
         ignore_index=True,
     )
-    return table[["source", "model", "n", "volume_fraction", "value", "low", "high", "runs"]]
+    columns = ["source", *key, "value", "low", "high", "status", "drift", "relation", "runs"]
+    return table[columns]
 
 
 def settling_in_time(runs: Iterable[xr.Dataset], points=500) -> pd.DataFrame:

@@ -12,7 +12,9 @@ from dustfall.analysis.settling import (
     even_interval,
     from_time,
     settling_velocities,
+    stokes_number,
 )
+from dustfall.analysis.time_averages import ROUNDING
 
 METHODS = ("periodogram", "welch")
 
@@ -160,7 +162,7 @@ def phase_and_spectra(
     for run in runs:
         part = from_time(run, start, "step")
         interval = even_interval(part["time"])
-        stokes_number = _stokes_number(run)
+        number = stokes_number(run)
         velocity, drag = (
             part[name].transpose("step", "tracked", "spatial").values[:, :, 2].astype(float)
             for name in ("tracked_velocity", "tracked_force")
@@ -177,11 +179,11 @@ def phase_and_spectra(
             phase = {"panel": "phase", "x": settling[kept], "y": drag[kept, i]}
             tables.append(pd.DataFrame(head | phase))
             # A float32 series of an undisturbed particle differs by rounding alone.
-            if np.ptp(settling) <= 1e-6 * abs(settling.mean()):
+            if np.ptp(settling) <= ROUNDING * abs(settling.mean()):
                 continue
-            kappa, energy = energy_spectrum(settling, interval, stokes_number, **settings)
+            kappa, energy = energy_spectrum(settling, interval, number, **settings)
             spectrum = averaged_in_bins(kappa, energy)
-            per_frequency = 2 * np.pi / (settling.mean() * stokes_number)
+            per_frequency = 2 * np.pi / (settling.mean() * number)
             highest = min(fit_frequencies[1], 0.25 / interval)
             limits = (fit_frequencies[0] * per_frequency, highest * per_frequency)
             law = spectral_slope(*(spectrum[c] for c in spectrum), limits=limits)
@@ -219,8 +221,8 @@ def cloud_spectra(
     tables = []
     for done, trajectory in enumerate(trajectories, start=1):
         velocity, interval = settling_velocities(trajectory, start)
-        if np.ptp(velocity, axis=0).max() > 1e-6 * abs(velocity.mean()):
-            speed = velocity.mean() * _stokes_number(trajectory)
+        if np.ptp(velocity, axis=0).max() > ROUNDING * abs(velocity.mean()):
+            speed = velocity.mean() * stokes_number(trajectory)
             slab = _slabs(trajectory, start)
             case = case_of(trajectory)
             head = {k: case[k] for k in ("volume_fraction", "n")}
@@ -269,9 +271,3 @@ def _slabs(trajectory, start):
     first = from_time(trajectory, start, "frame").isel(frame=0)
     place = first["coordinates"][:, 0].values / float(first["cell_lengths"][0])
     return np.minimum((SLABS * (place - np.floor(place))).astype(int), SLABS - 1)
-
-
-def _stokes_number(run: xr.Dataset) -> float:
-    if "stokes_number" not in run.attrs:
-        raise ValueError("the dataset lacks the attribute 'stokes_number'")
-    return float(run.attrs["stokes_number"])

@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from dustfall.analysis.settling import from_time, mean_with_interval
+from dustfall.analysis.settling import from_time
+from dustfall.analysis.time_averages import mean_with_interval
 
 STEADY = ("inverse_beta_mean", "settling_velocity_mean", "settling_velocity_variance")
 

@@ -11,10 +11,11 @@ from scipy import stats
 from dustfall.analysis.references import (
     MATCHED_GAMMA,
     PAPER_GAMMA,
-    PAPER_VORONOI_VARIANCE,
+    PAPER_SETTLING,
     POISSON_VORONOI_VARIANCE,
 )
-from dustfall.analysis.settling import CASE, case_of, correlation_length, from_time
+from dustfall.analysis.settling import CASE, STEADY, case_of, from_time
+from dustfall.analysis.time_averages import correlation_length
 from dustfall.sedimentation.start import random_positions
 from dustfall.sedimentation.state import box_length
 
@@ -263,16 +264,19 @@ def voronoi_variance_table(
     start: float,
     seed: int,
 ) -> pd.DataFrame:
-    """Tabulate the variance of normalised Voronoï volumes against the steady settling velocity.
+    """Tabulate the variance of normalised Voronoï volumes against the settling velocity.
 
     Parameters: `cells` as `cell_volumes` returns them, `steady` as `steady_state` returns it for
-    the same cases, `spheres` as `random_sphere_table` for their volume fractions, `start` of the
-    steady state [tau], `seed` of the bootstrap.
+    the settling velocity of the same cases, `spheres` as `random_sphere_table` for their volume
+    fractions, `start` of the averaging window [tau], `seed` of the bootstrap.
 
-    Returns the columns source, model, n, volume_fraction, galileo, variance, low, high (all over
-    k theta^2 = 0.2 of the paper's gamma law), inverse_beta, inverse_beta_low, inverse_beta_high.
-    Sources: "steady state"; "random spheres" without overlap at the same phi, at the velocity of
-    that phi's case with most particles; "random points", at each phi as well; and "paper".
+    Returns the columns source, model, n, volume_fraction, galileo, status, variance, low, high (all
+    over k theta^2 = 0.2 of the paper's gamma law), inverse_beta, inverse_beta_low,
+    inverse_beta_high, relation and inverse_beta_relation ("=", or the bound that the paper
+    states). Sources: "simulation", where a case that is not steady has the variance of its last
+    frame and the velocity at its end; "random spheres" without overlap at the same phi, at the
+    velocity of that phi's case with most particles; "random points", at each phi as well; and
+    "paper".
 
     Raises ValueError where there are no cells, or `steady` or `spheres` lacks their case.
     """
@@ -285,19 +289,21 @@ def voronoi_variance_table(
         if not same.any():
             raise ValueError(f"the table of steady states has no row for {case}")
         row = steady[same].iloc[0]
-        found = volume_variance(pooled_volumes(runs, start), seed)
+        settled = row["status"] == STEADY
+        since = start if settled else min(float(run["time"].max()) for run in runs)
+        found = volume_variance(pooled_volumes(runs, since), seed)
         rows.append(
-            {"source": "steady state"}
+            {"source": "simulation", "status": row["status"]}
             | case
             | _over(unit, found)
             | {
-                "inverse_beta": row["value"],
+                "inverse_beta": row["value"] if settled else row["end"],
                 "inverse_beta_low": row["low"],
                 "inverse_beta_high": row["high"],
             }
         )
-    steady_rows = pd.DataFrame(rows).sort_values(["galileo", "n"], ascending=[False, True])
-    for phi, largest in steady_rows.groupby("volume_fraction").last().iterrows():
+    simulation = pd.DataFrame(rows).sort_values(["galileo", "n"], ascending=[False, True])
+    for phi, largest in simulation.groupby("volume_fraction").last().iterrows():
         head = {"volume_fraction": phi, "inverse_beta": largest["inverse_beta"]}
         found = spheres[spheres["volume_fraction"] == phi]
         if found.empty:
@@ -306,8 +312,22 @@ def voronoi_variance_table(
         rows.append(head | source | _over(unit, found.iloc[0]))
         points = {"source": "random points", "variance": POISSON_VORONOI_VARIANCE / unit}
         rows.append(head | points)
-    table = pd.concat([pd.DataFrame(rows), PAPER_VORONOI_VARIANCE.assign(source="paper")])
+    table = pd.concat([pd.DataFrame(rows), _paper_points()])
     return table.sort_values(["source", "n", "volume_fraction", "galileo"], ignore_index=True)
+
+
+def _paper_points() -> pd.DataFrame:
+    """Variance and 1/beta of the paper side by side, each with its relation."""
+    both = PAPER_SETTLING.pivot(index="volume_fraction", columns="quantity")
+    return pd.DataFrame(
+        {
+            "source": "paper",
+            "variance": both["value", "voronoi_variance"],
+            "relation": both["relation", "voronoi_variance"],
+            "inverse_beta": both["value", "inverse_beta"],
+            "inverse_beta_relation": both["relation", "inverse_beta"],
+        }
+    ).reset_index()
 
 
 def _over(unit, found) -> dict[str, float]:

@@ -78,13 +78,16 @@ def force_scatter(frame: pd.DataFrame) -> Figure:
 def force_pdf(frame: pd.DataFrame) -> Figure:
     """P.d.f. of the force per decade of volume fraction: streamwise left, lateral right.
 
-    `frame`: component, phi_low, phi_high, samples, force, density, laplace_density, laplace_ks, as
-    `analysis.distributions.force_distributions` gives. Each decade is a ridge with its own height;
-    the number on it is its highest density. Dashed on the right: the fitted Laplace law.
+    `frame`: component, phi_low, phi_high, samples, force, density, laplace_density, laplace_ks,
+    laplace_ks_level, as `analysis.distributions.force_distributions` gives. Each decade is a ridge
+    with its own height; the number on it is its highest density. Dotted on the right: the fitted
+    Laplace law, with its Kolmogorov-Smirnov distance and, in brackets, that which one fit in twenty
+    exceeds.
     Raises ValueError for a missing column or fewer than two rows.
     """
     columns = ["component", "phi_low", "phi_high", "force", "density"]
-    require(frame, [*columns, "laplace_density", "laplace_ks"], "force_pdf", fewest=2)
+    law = ["laplace_density", "laplace_ks", "laplace_ks_level"]
+    require(frame, columns + law, "force_pdf", fewest=2)
     require_components(frame, ["streamwise", "spanwise", "vertical"], "force_pdf")
     decades = sorted(frame["phi_low"].unique())
     figure = new_figure(DOUBLE, 1.3 + 0.55 * len(decades))
@@ -116,7 +119,8 @@ def force_pdf(frame: pd.DataFrame) -> Figure:
                 curve = rows[rows["component"] == components[0]]
                 y = level + scale * curve["laplace_density"]
                 ax.plot(curve["force"], y, color="k", ls=":", lw=0.9, zorder=order)
-                note += f"\nKS {curve['laplace_ks'].iloc[0]:.2g}"
+                distance, level = curve[["laplace_ks", "laplace_ks_level"]].iloc[0]
+                note += f"\nKS {distance:.2g} ({level:.2g})"
             ax.annotate(
                 note,
                 (0.015, level),

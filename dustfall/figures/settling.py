@@ -5,15 +5,20 @@ import pandas as pd
 from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
+from matplotlib.ticker import MaxNLocator
 
+from dustfall.analysis.settling import STEADY
 from dustfall.figures.style import (
-    CATEGORY_COLOURS,
     DOUBLE,
     MARKERS,
     REFERENCE,
     SINGLE,
+    letter,
+    mark_bounds,
+    model_look,
+    model_title,
     new_figure,
+    number_label,
     phi_colour,
     phi_label,
     phi_legend,
@@ -24,57 +29,56 @@ from dustfall.figures.style import (
 PARTICLE_COLOURS = ("#d55e00", "#009e73", "#0072b2")
 """The paper's red, green and blue, in the set that the colour-blind can tell apart."""
 
-MODEL_NAMES = {
-    "idnn": "IDNN",
-    "anchored": "anchored IDNN",
-    "dense": "dense network",
-    "rotne_prager": "Rotne-Prager inverse",
-    "stokes": "isolated Stokes",
-}
-"""What a force model is called in a legend, by its `name`."""
-
 OBLIQUE = (0.45, 0.035)
 """How far depth is drawn to the right, in sides of the box, and up, in its height."""
 
-ASH = "volcanic ash, up to (Del Bello et al. 2017)"
+ADAPTED = 10.0
+"""Time [tau] after which the start at rest is forgotten (exp(-10) of it is left)."""
+
+ROOM = 0.06
+"""Share of an axis that is left free beyond the numbers drawn."""
+
+VISIBLE = 0.01
+"""Share of an axis that an arrow must span to be drawn: a shorter one is less than its head."""
+
+ASH_WIDTH = 10**0.25
+"""Half the width of the band of volcanic ash, as a factor of phi: its source says "about"."""
 
 
 @styled
 def inverse_beta(frame: pd.DataFrame) -> Figure:
-    """Steady settling velocity against volume fraction: for each n, and for each force model.
+    """Settling velocity against volume fraction: for each n, and for each force model.
 
-    `frame`: source, model, n, volume_fraction, value, low, high, as
+    `frame`: source, model, n, volume_fraction, value, low, high, status, drift, relation, as
     `analysis.settling.inverse_beta_table` gives. Left the model with most cases, beside what others
-    have; right the models at the smallest n that all of them ran with. Raises ValueError for a
-    missing column or a table without simulations.
+    have; right the models at the smallest n that all of them ran with. Filled with their interval:
+    steady cases; hollow: at the end of runs that are not steady, with an arrow along their drift
+    over the averaging window. Raises ValueError for a missing column or a table without
+    simulations.
     """
-    columns = ["source", "model", "n", "volume_fraction", "value", "low", "high"]
-    require(frame, columns, "inverse_beta")
+    columns = ["source", "model", "n", "volume_fraction", "value", "low", "high", "status", "drift"]
+    require(frame, [*columns, "relation"], "inverse_beta")
     simulation = frame[frame["source"] == "simulation"]
     if simulation.empty:
         raise ValueError("the table of inverse_beta has no rows of source 'simulation'")
-    figure = new_figure(DOUBLE, 3.5)
-    left, right = figure.subplots(1, 2)
+    figure = new_figure(DOUBLE, 3.9)
+    left, right = figure.subplots(1, 2, sharey=True)
+    shown = frame[frame["source"] != "Del Bello 2017"]
+    low, high = shown[["value", "low"]].min(axis=None), shown[["value", "high"]].max(axis=None)
+    room = ROOM * (high - low) or ROOM
+    right.set_ylim(low - room, high + room)
     principal = simulation["model"].value_counts().index[0]
-    numbers = simulation[simulation["model"] == principal].groupby("n")
-    for i, (n, rows) in enumerate(numbers):
-        _settling_curve(left, rows, i, _number(n))
+    for i, (n, rows) in enumerate(simulation[simulation["model"] == principal].groupby("n")):
+        look = model_look(principal) | {"marker": MARKERS[i % len(MARKERS)]}
+        _settling_curve(left, rows, look, number_label(n), i)
     compared = _models_at_one_number(simulation, principal)
     for i, (model, rows) in enumerate(compared):
-        _settling_curve(right, rows, i, MODEL_NAMES.get(model, model))
-
-    _paper_and_random_start(left, frame)
+        _settling_curve(right, rows, model_look(model), model_title(model), i)
+    _random_start(left, frame, principal)
+    _paper(left, frame)
     _batchelor(left, frame)
     _batchelor(right, frame)
-    ash = frame[frame["source"] == "Del Bello 2017"]
-    right.plot(
-        ash["volume_fraction"], ash["value"], ls="none", marker="_", ms=9, color="k", label=ASH
-    )
-    right.vlines(ash["volume_fraction"], ash["low"], ash["high"], color="k", lw=0.9)
-    right.set_yscale("log")
-    right.yaxis.set_major_locator(FixedLocator([1, 1.5, 2, 3, 4]))
-    right.yaxis.set_major_formatter("{x:g}")
-    right.yaxis.set_minor_locator(NullLocator())
+    _ash(right, frame)
     for ax in (left, right):
         ax.set_xscale("log")
         ax.set_xlabel(r"volume fraction $\varphi$")
@@ -82,34 +86,46 @@ def inverse_beta(frame: pd.DataFrame) -> Figure:
         ours = [isinstance(handle, ErrorbarContainer) for handle in handles]
         order = np.argsort(np.logical_not(ours), kind="stable")
         ax.legend([handles[i] for i in order], [labels[i] for i in order], loc="upper left")
-    left.set_title(MODEL_NAMES.get(principal, principal), loc="left")
-    right.set_title(f"force models, {_number(compared[0][1]['n'].iloc[0])}", loc="left")
+    left.set_title(f"(a) {model_title(principal)}", loc="left")
+    right.set_title(f"(b) force models, {number_label(compared[0][1]['n'].iloc[0])}", loc="left")
     left.set_ylabel(r"$\langle v_s\rangle / v_{s,\mathrm{Stokes}} = 1/\beta$")
+    if (simulation["status"] != STEADY).any():
+        note = "filled: steady, 95 % interval; hollow: not steady, end of the run, arrow: its drift"
+        figure.legend(handles=[], title=note, loc="outside lower center", title_fontsize=8)
     return figure
 
 
-def _number(n):
-    """Number of particles, with thin spaces between thousands."""
-    return f"$n = {int(n):,}$".replace(",", r"\,")
-
-
-def _settling_curve(ax, rows, i, label):
+def _settling_curve(ax, rows, look, label, i):
     """One curve with its intervals; markers of later curves are larger, so that none is hidden."""
     rows = rows.sort_values("volume_fraction")
+    size = 4 + 1.5 * i
     ax.errorbar(
         rows["volume_fraction"],
         rows["value"],
         yerr=np.nan_to_num([rows["value"] - rows["low"], rows["high"] - rows["value"]]),
-        color=CATEGORY_COLOURS[i % len(CATEGORY_COLOURS)],
-        marker=MARKERS[i % len(MARKERS)],
-        mfc="none",
-        ms=4 + 1.5 * i,
+        color=look["color"],
+        marker=look["marker"],
+        mfc="white",
+        ms=size,
         lw=0.9,
         elinewidth=0.9,
         capsize=2.5,
         label=label,
-        zorder=4 - 0.1 * i,
+        zorder=4 - 0.3 * i,
     )
+    steady = rows["status"] == STEADY
+    filled = rows[steady]
+    # Matplotlib puts the markers of error bars 0.1 above these.
+    above = 4.15 - 0.3 * i
+    ax.plot(filled["volume_fraction"], filled["value"], ls="none", ms=size, zorder=above, **look)
+    seen = rows["drift"].abs() > VISIBLE * np.ptp(ax.get_ylim())
+    for row in rows[~steady & seen].itertuples():
+        ax.annotate(
+            "",
+            (row.volume_fraction, row.value),
+            (row.volume_fraction, row.value - row.drift),
+            arrowprops={"arrowstyle": "->", "color": look["color"], "lw": 0.8, "shrinkB": 0},
+        )
 
 
 def _models_at_one_number(simulation, principal):
@@ -125,22 +141,28 @@ def _models_at_one_number(simulation, principal):
     return sorted(rows.groupby("model"), key=lambda group: group[0] != principal)
 
 
-def _paper_and_random_start(ax, frame):
+def _paper(ax, frame):
     paper = frame[frame["source"] == "paper"]
+    place, value = paper["volume_fraction"], paper["value"]
     ax.plot(
-        paper["volume_fraction"],
-        paper["value"],
+        place,
+        value,
         ls="none",
         marker="*",
         ms=8,
         color="k",
-        label="paper, steady state",
+        label="paper (arrow: a bound)",
         zorder=5,
     )
-    ranges = paper.dropna(subset=["low", "high"])
-    ax.vlines(ranges["volume_fraction"], ranges["low"], ranges["high"], color="k", lw=0.9)
-    rows = frame[frame["source"] == "random start"].sort_values("volume_fraction")
-    label = r"random start, $\overline{1/\beta}$ (Rotne-Prager)"
+    mark_bounds(ax, place, value, paper["relation"])
+
+
+def _random_start(ax, frame, model):
+    """1/beta of the random start, of the largest cloud of each volume fraction."""
+    rows = frame[(frame["source"] == "random start") & (frame["model"] == model)]
+    rows = rows.sort_values("n").drop_duplicates("volume_fraction", keep="last")
+    rows = rows.sort_values("volume_fraction")
+    label = r"random start, mean of $1/\beta$"
     ax.plot(rows["volume_fraction"], rows["value"], color=REFERENCE, ls="--", label=label)
 
 
@@ -150,13 +172,28 @@ def _batchelor(ax, frame):
     ax.plot(rows["volume_fraction"], rows["value"], color=REFERENCE, ls=":", label=label)
 
 
+def _ash(ax, frame):
+    """Range of what others state of volcanic ash; the axis does not follow it."""
+    for row in frame[frame["source"] == "Del Bello 2017"].itertuples():
+        ax.fill_between(
+            [row.volume_fraction / ASH_WIDTH, row.volume_fraction * ASH_WIDTH],
+            row.low,
+            row.high,
+            color="0.88",
+            lw=0,
+            zorder=0,
+            label=f"volcanic ash, {row.low:g} to {row.high:g} (Del Bello et al. 2017)",
+        )
+
+
 @styled
 def settling_in_time(frame: pd.DataFrame) -> Figure:
-    """Mean (solid) and variance (dashed) over particles of the settling velocity in time.
+    """Mean over particles of the settling velocity in time, its later drift, and the variance.
 
-    `frame`: n, volume_fraction, time, mean, variance, as `analysis.settling.settling_in_time`
-    gives for one model; one column of panels for each n. Raises ValueError for a missing column,
-    several models or fewer than two rows.
+    `frame`: model, n, volume_fraction, time, mean, variance, as
+    `analysis.settling.settling_in_time` gives for one model; one column of panels for each n. The
+    drift is the change of the mean since `ADAPTED` (in a shorter run since half of it). Raises
+    ValueError for a missing column, several models or fewer than two rows.
     """
     columns = ["model", "n", "volume_fraction", "time", "mean", "variance"]
     require(frame, columns, "settling_in_time", fewest=2)
@@ -165,74 +202,108 @@ def settling_in_time(frame: pd.DataFrame) -> Figure:
             f"settling_in_time draws one model, not {frame['model'].unique().tolist()}"
         )
     numbers = sorted(frame["n"].unique())
-    figure = new_figure(DOUBLE if len(numbers) > 1 else 1.3 * SINGLE, 4.2)
-    axes = figure.subplots(2, len(numbers), squeeze=False, sharex=True, sharey="row")
+    figure = new_figure(DOUBLE if len(numbers) > 1 else 1.3 * SINGLE, 6.0)
+    axes = figure.subplots(3, len(numbers), squeeze=False, sharex=True, sharey="row")
+    since = min(ADAPTED, frame["time"].max() / 2)
     for column, n in enumerate(numbers):
-        upper, lower = axes[:, column]
+        mean, drift, variance = axes[:, column]
         for phi, rows in frame[frame["n"] == n].groupby("volume_fraction"):
             rows = rows.sort_values("time")
-            upper.plot(rows["time"], rows["mean"], color=phi_colour(phi), lw=1)
+            colour = phi_colour(phi)
+            mean.plot(rows["time"], rows["mean"], color=colour, lw=1)
+            later = rows[rows["time"] >= since]
+            if not later.empty:
+                change = 100 * (later["mean"] / later["mean"].iloc[0] - 1)
+                drift.plot(later["time"], change, color=colour, lw=1)
             # A start at rest has no variance, and a logarithmic axis no zero.
-            variance = rows["variance"].where(rows["variance"] > 0)
-            lower.plot(rows["time"], variance, color=phi_colour(phi), lw=1, ls=(0, (4, 1.2)))
-        upper.axhline(1, color=REFERENCE, lw=0.6, zorder=0)
-        upper.set_title(_number(n))
-        lower.set_yscale("log")
-        lower.set_xlabel(r"time $t/\tau$")
-    variance = frame["variance"][frame["variance"] > 0]
-    if not variance.empty:
-        axes[1, 0].set_ylim(0.5 * variance.quantile(0.01), 2 * variance.max())
+            positive = rows["variance"].where(rows["variance"] > 0)
+            variance.plot(rows["time"], positive, color=colour, lw=1)
+        mean.axhline(1, color=REFERENCE, lw=0.6, zorder=0)
+        drift.axhline(0, color=REFERENCE, lw=0.6, zorder=0)
+        mean.set_title(number_label(n))
+        variance.set_yscale("log")
+        variance.set_xlabel(r"time $t/\tau$")
+    positive = frame["variance"][frame["variance"] > 0]
+    if not positive.empty:
+        axes[2, 0].set_ylim(0.5 * positive.quantile(0.01), 2 * positive.max())
     axes[0, 0].set_ylabel(r"mean $\langle v_s\rangle^{p} / v_{s,\mathrm{Stokes}}$")
-    axes[1, 0].set_ylabel(r"variance $\mathrm{var}^{p}(v_s) / v_{s,\mathrm{Stokes}}^2$")
+    axes[1, 0].set_ylabel(f"change of the mean\nsince ${since:g}\\,\\tau$ [%]")
+    axes[2, 0].set_ylabel(r"variance $\mathrm{var}^{p}(v_s) / v_{s,\mathrm{Stokes}}^2$")
+    letter(axes[:, 0])
     phi_legend(figure, frame["volume_fraction"])
     return figure
 
 
 @styled
 def phase_and_spectra(frame: pd.DataFrame) -> Figure:
-    """Phase diagram (left) and energy spectrum (right) of each tracked particle, one a row.
+    """Phase diagrams of the tracked particles, a panel a volume fraction, and their spectra below.
 
-    `frame`: panel, volume_fraction, particle, x, y, slope, slope_error, as
-    `analysis.spectra.phase_and_spectra` gives for one n. The slope written in a panel is that of
-    the densest case. Raises ValueError for a missing column, several n or fewer than two rows.
+    `frame`: panel, volume_fraction, n, particle, x, y, slope, slope_error, as
+    `analysis.spectra.phase_and_spectra` gives for one n. Orbits are drawn about the mean of each,
+    at their panel's own scale, so that dilute ones show as well. Dashed: fitted power laws; the
+    slope written in a panel is that of the densest case. Raises ValueError for a missing column,
+    several n or fewer than two rows.
     """
     columns = ["panel", "volume_fraction", "n", "particle", "x", "y", "slope", "slope_error"]
     require(frame, columns, "phase_and_spectra", fewest=2)
     if frame["n"].nunique() > 1:
         raise ValueError(f"phase_and_spectra draws one n, not {frame['n'].unique().tolist()}")
-    particles = sorted(frame["particle"].unique())
-    figure = new_figure(DOUBLE, 0.6 + 2.1 * len(particles))
-    axes = figure.subplots(len(particles), 2, squeeze=False, sharex="col", sharey="col")
-    for row, particle in enumerate(particles):
-        left, right = axes[row]
-        part = frame[frame["particle"] == particle]
-        for phi, rows in sorted(part.groupby("volume_fraction"), reverse=True):
-            colour = phi_colour(phi)
-            phase, spectrum, fit = (rows[rows["panel"] == p] for p in ("phase", "spectrum", "fit"))
-            left.plot(phase["x"], phase["y"], color=colour, lw=0.7)
-            # A dilute orbit is smaller than a line is wide: its last point shows where it is.
-            left.plot(phase["x"].iloc[-1:], phase["y"].iloc[-1:], color=colour, marker="o", ms=2.5)
-            right.plot(spectrum["x"], spectrum["y"], color=colour, lw=0.9)
-            right.plot(fit["x"], fit["y"], color="k", lw=0.6, ls="--", zorder=5)
-        fits = part[part["panel"] == "fit"]
-        if not fits.empty:
-            densest = fits.sort_values("volume_fraction").iloc[-1]
-            note = (
-                f"slope at $\\varphi = ${phi_label(densest['volume_fraction'])}: "
-                f"${densest['slope']:.2f} \\pm {densest['slope_error']:.2f}$"
-            )
-            right.text(0.04, 0.06, note, transform=right.transAxes, fontsize=8)
-        left.axhline(1, color=REFERENCE, lw=0.5, zorder=0)
-        left.axvline(1, color=REFERENCE, lw=0.5, zorder=0)
-        left.set_ylabel(r"$F_d / (F_g - F_b)$")
-        left.set_title(f"particle {particle}", loc="left", fontsize=8, pad=3)
-        right.set_xscale("log")
-        right.set_yscale("log")
-        right.set_ylabel(r"$E(\kappa)\;[v_{s,\mathrm{Stokes}}^2\, d_p]$")
-    axes[-1, 0].set_xlabel(r"$v_s / v_{s,\mathrm{Stokes}}$")
-    axes[-1, 1].set_xlabel(r"wavenumber $\kappa\;[1/d_p]$")
-    phi_legend(figure, frame["volume_fraction"])
+    phis, particles = sorted(frame["volume_fraction"].unique()), sorted(frame["particle"].unique())
+    wide = min(3, len(phis))
+    high = -(-len(phis) // wide)
+    figure = new_figure(DOUBLE, 0.8 + 2.0 * (high + 1))
+    above, below = figure.subfigures(2, 1, height_ratios=[high, 1.15])
+    orbits = above.subplots(high, wide, squeeze=False).ravel()
+    for ax, phi in zip(orbits, phis, strict=False):
+        _orbits(ax, frame[(frame["panel"] == "phase") & (frame["volume_fraction"] == phi)])
+        ax.set_title(f"$\\varphi = ${phi_label(phi)}", loc="right")
+    for ax in orbits[len(phis) :]:
+        ax.set_visible(False)
+    for ax in orbits[: len(phis)][-wide:]:
+        ax.set_xlabel(r"$(v_s - \overline{v_s}) / v_{s,\mathrm{Stokes}}$")
+    for ax in orbits[::wide]:
+        ax.set_ylabel(r"$F_d / (F_g - F_b) - 1$")
+    spectra = below.subplots(1, len(particles), squeeze=False, sharex=True, sharey=True)[0]
+    for ax, particle in zip(spectra, particles, strict=True):
+        _spectra(ax, frame[(frame["panel"] != "phase") & (frame["particle"] == particle)])
+        ax.set_title(f"particle {particle}", loc="right")
+    spectra[0].set_ylabel(r"$E(\kappa)\;[v_{s,\mathrm{Stokes}}^2\, d_p]$")
+    letter([*orbits[: len(phis)], *spectra])
+    _particle_legend(above, frame)
+    phi_legend(below, phis)
     return figure
+
+
+def _orbits(ax, frame):
+    for i, (_, rows) in enumerate(frame.groupby("particle")):
+        colour = PARTICLE_COLOURS[i % len(PARTICLE_COLOURS)]
+        x, y = rows["x"] - rows["x"].mean(), rows["y"] - 1
+        ax.plot(x, y, color=colour, lw=0.7)
+        ax.plot(x.iloc[-1:], y.iloc[-1:], color=colour, marker="o", ms=2.5)
+    ax.axhline(0, color=REFERENCE, lw=0.5, zorder=0)
+    ax.axvline(0, color=REFERENCE, lw=0.5, zorder=0)
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_locator(MaxNLocator(4))
+    # Powers of ten stand at the ends of the axes, not in every number.
+    ax.ticklabel_format(scilimits=(-2, 2))
+
+
+def _spectra(ax, frame):
+    for phi, rows in frame.groupby("volume_fraction"):
+        spectrum, fit = (rows[rows["panel"] == panel] for panel in ("spectrum", "fit"))
+        ax.plot(spectrum["x"], spectrum["y"], color=phi_colour(phi), lw=0.9)
+        ax.plot(fit["x"], fit["y"], color="k", lw=0.6, ls="--", zorder=5)
+    fits = frame[frame["panel"] == "fit"]
+    if not fits.empty:
+        densest = fits.sort_values("volume_fraction").iloc[-1]
+        note = (
+            f"$\\varphi = ${phi_label(densest['volume_fraction'])}: slope "
+            f"${densest['slope']:.2f} \\pm {densest['slope_error']:.2f}$"
+        )
+        ax.text(0.04, 0.06, note, transform=ax.transAxes, fontsize=7.5)
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    ax.set_xlabel(r"wavenumber $\kappa\;[1/d_p]$")
 
 
 @styled

@@ -2,6 +2,7 @@
 
 import functools
 from collections.abc import Callable, Iterable, Sequence
+from zlib import crc32
 
 import matplotlib as mpl
 import numpy as np
@@ -9,6 +10,7 @@ import pandas as pd
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from dustfall.files import atomic
 
@@ -61,6 +63,23 @@ CATEGORY_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
+MODEL_TITLES = {
+    "idnn": "IDNN",
+    "anchored": "anchored IDNN",
+    "rotne_prager": "Rotne-Prager inverse",
+    "isolated": "isolated sphere (Stokes)",
+    "dense": "dense network",
+    "reflections": "two reflections",
+    "stokeslets": "Stokeslets",
+    "dense_sorted": "dense network, sorted neighbours",
+    "pairwise": "pairwise network",
+    "unit_vectors": "IDNN of unit vectors",
+    "canonical": "IDNN in the canonical frame",
+    "residual": "IDNN on Rotne-Prager",
+    "anchored_pairwise": "anchored pairwise network",
+}
+"""What a force model is called in a figure, by its name; the order is that of the looks."""
+
 REFERENCE = "0.35"
 """Grey of reference lines and of other people's points."""
 
@@ -84,6 +103,51 @@ def new_figure(width: float, height: float) -> Figure:
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
+
+
+def model_title(model: str) -> str:
+    """What a force model is called in a figure: its title, or else its name in words."""
+    return MODEL_TITLES.get(model, model.replace("_", " "))
+
+
+def model_look(model: str) -> dict[str, str]:
+    """Colour and marker of a force model, the same in all figures."""
+    known = list(MODEL_TITLES)
+    # Models that have no title yet share what the known ones leave over, by their name alone.
+    number = known.index(model) if model in known else len(known) + crc32(model.encode())
+    colours, markers = len(CATEGORY_COLOURS), len(MARKERS)
+    return {
+        "color": CATEGORY_COLOURS[number % colours],
+        # One further on in each round of the colours, so that no two looks are the same.
+        "marker": MARKERS[(number + number // colours) % markers],
+    }
+
+
+def number_label(particles: int) -> str:
+    """Number of particles, with thin spaces between thousands."""
+    return f"$n = {int(particles):,}$".replace(",", r"\,")
+
+
+def mark_bounds(ax, x, y, relations, along="y", length=14) -> None:
+    """Draw an arrow of `length` [point] from each bound: towards more for ">=", less for "<="."""
+    for place, value, relation in zip(x, y, relations, strict=True):
+        if relation in (">=", "<="):
+            reach = length if relation == ">=" else -length
+            ax.annotate(
+                "",
+                (place, value),
+                (0, reach) if along == "y" else (reach, 0),
+                textcoords="offset points",
+                # The head is at the text, which is empty.
+                arrowprops={"arrowstyle": "<-", "lw": 0.9, "shrinkA": 0, "shrinkB": 0},
+            )
+
+
+def plain_ticks(axis, most=6) -> None:
+    """Number a logarithmic axis of less than two decades in plain numbers, at 1, 2, 3 and 5."""
+    axis.set_major_locator(LogLocator(subs=(1, 2, 3, 5), numticks=most))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter(NullFormatter())
 
 
 def phi_colour(volume_fraction: float):

@@ -5,13 +5,17 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from dustfall.analysis.settling import STEADY
 from dustfall.figures.style import (
     CATEGORY_COLOURS,
     MARKERS,
     REFERENCE,
     SINGLE,
+    mark_bounds,
     new_figure,
+    number_label,
     phi_colour,
+    phi_label,
     phi_legend,
     require,
     styled,
@@ -66,20 +70,23 @@ def voronoi_pdf(frame: pd.DataFrame) -> Figure:
 def voronoi_variance(frame: pd.DataFrame) -> Figure:
     """Variance of normalised Voronoï volumes against settling velocity, by volume fraction.
 
-    `frame`: source, n, volume_fraction, galileo, variance, low, high, inverse_beta,
-    inverse_beta_low, inverse_beta_high, as `analysis.voronoi.voronoi_variance_table` gives.
-    Hollow: random spheres at the same phi. Raises ValueError for a missing column or an empty
-    table.
+    `frame`: source, n, volume_fraction, status, variance, low, high, inverse_beta,
+    inverse_beta_low, inverse_beta_high, relation, inverse_beta_relation, as
+    `analysis.voronoi.voronoi_variance_table` gives. Filled: steady, with 95 % intervals; hollow:
+    the end of runs that are not steady. Crosses: random spheres at the same phi. Raises ValueError
+    for a missing column or an empty table.
     """
-    columns = ["source", "n", "volume_fraction", "variance", "low", "high"]
-    speed = ["inverse_beta", "inverse_beta_low", "inverse_beta_high"]
+    columns = ["source", "n", "volume_fraction", "status", "variance", "low", "high", "relation"]
+    speed = ["inverse_beta", "inverse_beta_low", "inverse_beta_high", "inverse_beta_relation"]
     require(frame, [*columns, *speed], "voronoi_variance")
-    figure = new_figure(1.4 * SINGLE, 3.5)
+    figure = new_figure(1.4 * SINGLE, 4.2)
     ax = figure.subplots()
-    ours = frame[frame["source"] == "steady state"]
+    ours = frame[frame["source"] == "simulation"]
     numbers = sorted(ours["n"].unique())
     for row in ours.itertuples():
         size = numbers.index(row.n)
+        colour = phi_colour(row.volume_fraction)
+        steady = row.status == STEADY
         ax.errorbar(
             row.inverse_beta,
             row.variance,
@@ -90,10 +97,11 @@ def voronoi_variance(frame: pd.DataFrame) -> Figure:
                     [row.inverse_beta_high - row.inverse_beta],
                 ]
             ),
-            color=phi_colour(row.volume_fraction),
+            color=colour,
             marker=MARKERS[size % len(MARKERS)],
-            mec="white",
-            mew=0.5,
+            mfc=colour if steady else "white",
+            mec="white" if steady else colour,
+            mew=0.5 if steady else 1,
             ms=6,
             elinewidth=0.8,
             capsize=2,
@@ -101,16 +109,14 @@ def voronoi_variance(frame: pd.DataFrame) -> Figure:
             # The largest cloud, which knows best, on top.
             zorder=3 + 0.1 * size,
         )
-    spheres = frame[frame["source"] == "random spheres"]
-    for row in spheres.itertuples():
+    for row in frame[frame["source"] == "random spheres"].itertuples():
         ax.errorbar(
             row.inverse_beta,
             row.variance,
             yerr=[[row.variance - row.low], [row.high - row.variance]],
             color=phi_colour(row.volume_fraction),
-            marker="o",
-            mfc="white",
-            ms=4,
+            marker="x",
+            ms=5,
             elinewidth=0.8,
             ls="none",
             zorder=4,
@@ -119,24 +125,34 @@ def voronoi_variance(frame: pd.DataFrame) -> Figure:
     ax.plot(points["inverse_beta"], points["variance"], color=REFERENCE, lw=0.8, ls="--", zorder=0)
     paper = frame[frame["source"] == "paper"]
     ax.plot(paper["inverse_beta"], paper["variance"], ls="none", marker="*", ms=8, color="k")
+    place = paper["inverse_beta"], paper["variance"]
+    mark_bounds(ax, *place, paper["relation"])
+    mark_bounds(ax, *place, paper["inverse_beta_relation"], along="x")
+    for row in paper.itertuples():
+        ax.annotate(
+            phi_label(row.volume_fraction),
+            (row.inverse_beta, row.variance),
+            (-5, 4),
+            textcoords="offset points",
+            ha="right",
+            fontsize=7,
+        )
     ax.set_xlabel(r"settling velocity $\langle v_s\rangle / v_{s,\mathrm{Stokes}} = 1/\beta$")
     ax.set_ylabel(r"$\mathrm{var}(V\,/\,\overline{V}) \;/\; (k\theta^2)$")
     handles = [
         Line2D(
-            [],
-            [],
-            color="k",
-            ls="none",
-            marker=MARKERS[i % len(MARKERS)],
-            label=f"$n = {int(n):,}$".replace(",", r"\,"),
+            [], [], color="k", ls="none", marker=MARKERS[i % len(MARKERS)], label=number_label(n)
         )
         for i, n in enumerate(numbers)
     ]
+    if (ours["status"] != STEADY).any():
+        look = {"marker": "o", "mfc": "white"}
+        handles.append(Line2D([], [], color="k", ls="none", label="not steady: its end", **look))
     handles += [
-        Line2D([], [], color="k", ls="none", marker="*", ms=8, label="paper"),
-        Line2D([], [], color="k", ls="none", marker="o", mfc="none", label="random spheres"),
+        Line2D([], [], color="k", ls="none", marker="x", label="random spheres"),
         Line2D([], [], color=REFERENCE, lw=0.8, ls="--", label="random points"),
+        Line2D([], [], color="k", ls="none", marker="*", ms=8, label="paper (arrow: a bound)"),
     ]
-    ax.legend(handles=handles, loc="upper left")
+    ax.legend(handles=handles, loc="lower right")
     phi_legend(figure, ours["volume_fraction"])
     return figure

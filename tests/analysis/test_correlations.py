@@ -28,7 +28,7 @@ def stokeslet_scenes(m=6000, seed=2):
     return r[..., None] * e, 24 * (np.array([0, 1, 0]) - slowing.sum(axis=1))
 
 
-def test_spearman_is_that_of_scipy_and_averaged_over_neighbours():
+def test_each_neighbour_has_its_own_rank_correlation_and_the_mean_is_over_neighbours():
     rng = np.random.default_rng(8)
     neighbours = rng.normal(size=(200, 5, 3)) + 3
     force = rng.normal(size=(200, 3)) + neighbours[:, 0]

@@ -1,9 +1,10 @@
+"""Scores of known errors, and symmetries that are broken by just those that break them."""
+
 import numpy as np
 import pytest
 
 from dustfall.analysis.evaluation import (
     error_by_gap,
-    prediction_cost,
     scores,
     symmetry_violations,
 )
@@ -84,7 +85,3 @@ def test_symmetries_are_broken_by_just_those_models_that_break_them(test_scenes)
     assert table["drift", "mirror"] == pytest.approx(1.0)
     assert table["drift", "rotation"] == pytest.approx(2 * 0.5 * np.sin(0.5))
     assert table["bias", "inversion"] == pytest.approx(2 * np.abs(neighbours[:, 0, 1]).max())
-
-
-def test_cost_counts_microseconds_a_scene(test_scenes):
-    assert 0 < prediction_cost(ISOLATED, test_scenes.neighbours, 2) < 1e6

@@ -1,26 +1,23 @@
-"""Steady-state means with intervals, and the tables of time series and paths."""
+"""Steady-state means with intervals, what is not steady, and tables of time series and paths."""
 
 import numpy as np
 import pytest
 import xarray as xr
-from scipy import signal
 
 from dustfall.analysis.settling import (
+    DRIFTING,
     SHARED_NEIGHBOURS,
-    correlation_length,
+    STEADY,
+    TOO_SHORT,
     inverse_beta_table,
-    mean_with_interval,
     settling_in_time,
+    steadiness,
     steady_state,
     tracked_trajectories,
 )
+from tests.analysis.series import autoregressive
 
-
-def autoregressive(rng, m, memory):
-    """A stationary first-order autoregressive series of unit variance."""
-    a = np.exp(-1 / memory)
-    noise = np.sqrt(1 - a**2) * rng.normal(size=m)
-    return signal.lfilter([1], [1, -a], noise, zi=[a * rng.normal()])[0]
+BOTH = ("settling_velocity_mean", "inverse_beta_mean")
 
 
 def run(seed=0, phi=1e-3, n=1000, galileo=0.078, steps=401, mean=1.4, variance=0.02):
@@ -33,34 +30,30 @@ def run(seed=0, phi=1e-3, n=1000, galileo=0.078, steps=401, mean=1.4, variance=0
             "time": ("step", time),
             "settling_velocity_mean": ("step", velocity),
             "settling_velocity_variance": ("step", np.full(steps, variance)),
+            "inverse_beta_mean": ("step", velocity + 0.05),
             "new_neighbours": ("step", rng.uniform(0, 0.01, steps)),
             "tracked_position": (("step", "tracked", "spatial"), position),
         },
-        attrs={"model": "idnn", "n": n, "volume_fraction": phi, "galileo": galileo, "seed": seed},
+        attrs={
+            "model": "idnn",
+            "n": n,
+            "volume_fraction": phi,
+            "galileo": galileo,
+            "stokes_number": 9.0,
+            "stream": seed,
+        },
     )
 
 
-def test_correlation_length_of_an_autoregressive_series():
-    a = np.exp(-1 / 10)
-    series = autoregressive(np.random.default_rng(1), 200_000, 10)
-    assert correlation_length(series) == pytest.approx((1 + a) / (1 - a), rel=0.05)
-    assert correlation_length(np.random.default_rng(2).normal(size=10_000)) < 1.2
-    assert correlation_length(np.ones(50)) == 1
+def rising(seed=0, by=0.1, **changes):
+    """A run whose mean velocity rises by `by` from 50 to 100 tau."""
+    series = run(seed, **changes)
+    series["settling_velocity_mean"] += by * (series["time"] / 50 - 1)
+    return series
 
 
-@pytest.mark.parametrize("memory", [1e-3, 20.0])
-def test_intervals_hold_the_true_mean_as_often_as_they_say(memory):
-    rng = np.random.default_rng(int(memory) + 1)
-    held = 0
-    for _ in range(400):
-        mean = mean_with_interval(autoregressive(rng, 2000, memory))
-        held += abs(mean.value) < mean.half_width
-    assert 0.91 < held / 400 < 0.98
-
-
-def test_a_series_taken_for_independent_would_have_too_narrow_an_interval():
-    series = autoregressive(np.random.default_rng(5), 2000, 20)
-    assert mean_with_interval(series).standard_error > 3 * series.std() / np.sqrt(2000)
+def window(series):
+    return series.isel(step=series["time"].values >= 50)
 
 
 def test_the_mean_is_that_of_all_steps_from_the_start_of_the_statistics():
@@ -70,6 +63,48 @@ def test_the_mean_is_that_of_all_steps_from_the_start_of_the_statistics():
     assert row["value"] == pytest.approx(expected, rel=1e-15)
     assert row["low"] < row["value"] < row["high"]
     assert (row["model"], row["n"], row["runs"]) == ("idnn", 1000, 1)
+
+
+def test_a_case_whose_mean_or_variance_changes_along_its_window_is_not_steady():
+    assert steadiness([window(run())])[0] == STEADY
+    assert steadiness([window(rising())])[0] == DRIFTING
+    spreading = run()
+    spreading["settling_velocity_variance"] = 0.02 * (1 + spreading["time"] / 100)
+    assert steadiness([window(spreading)])[0] == DRIFTING
+    # Opposite drifts of two runs are the scatter between starts, no drift of the case.
+    falling = rising()
+    falling["settling_velocity_mean"] = 2.8 - falling["settling_velocity_mean"]
+    assert steadiness([window(falling)])[0] == DRIFTING
+    assert steadiness([window(rising()), window(falling)])[0] == STEADY
+
+
+def test_a_drift_too_small_for_one_run_is_found_in_many():
+    runs = [window(rising(seed, by=0.01)) for seed in range(30)]
+    alone = [steadiness([one])[0] for one in runs]
+    assert alone.count(DRIFTING) < 15
+    assert steadiness(runs)[0] == DRIFTING
+
+
+def test_steady_runs_are_rarely_taken_for_drifting_ones():
+    found = [steadiness([window(run(seed))])[0] for seed in range(120)]
+    assert found.count(DRIFTING) < 14
+
+
+def test_a_cloud_that_keeps_its_random_start_is_not_steady_however_even_its_mean():
+    # Spacing 37.4 d_p, and 0.02 v_s times 9 d_p/tau over 50 tau: a quarter of it.
+    status, spacings = steadiness([window(run(phi=1e-5, variance=0.02**2))])
+    assert status == TOO_SHORT
+    assert spacings == pytest.approx(0.02 * 9 * 50 / 37.41, rel=1e-3)
+    assert steadiness([window(run(phi=1e-5, variance=0.0))])[0] == STEADY
+
+
+def test_what_is_not_steady_has_a_trend_and_an_end_and_no_average():
+    (row,) = steady_state([rising()], 50.0).to_dict("records")
+    assert row["status"] == DRIFTING
+    assert np.isnan([row[c] for c in ("value", "low", "high", "standard_error")]).all()
+    assert row["drift"] == pytest.approx(0.1, abs=4 * row["drift_error"])
+    assert row["drift_error"] < 0.02
+    assert row["end"] == pytest.approx(1.5, abs=0.02)
 
 
 def test_a_frozen_cloud_is_one_draw_of_its_particles_however_long_it_runs():
@@ -92,7 +127,7 @@ def test_several_seeds_give_the_spread_between_them():
 
 def test_other_quantities_and_cases_each_have_their_row():
     runs = [run(phi=1e-3), run(phi=1e-5), run(phi=1e-3, galileo=0.156)]
-    table = steady_state(runs, 50.0, "new_neighbours")
+    table = steady_state(runs, 50.0, ["new_neighbours"])
     assert table[["volume_fraction", "galileo"]].to_numpy().tolist() == [
         [1e-5, 0.078],
         [1e-3, 0.078],
@@ -101,19 +136,24 @@ def test_other_quantities_and_cases_each_have_their_row():
     assert table["value"].between(0.004, 0.006).all()
 
 
-def test_inverse_beta_table_holds_simulation_and_references_at_the_lowest_galileo_number():
-    steady = steady_state([run(galileo=0.156, mean=2.0), run(galileo=0.078, mean=1.4)], 50.0)
-    table = inverse_beta_table(steady)
-    (ours,) = table[table["source"] == "simulation"].to_dict("records")
-    assert ours["value"] == pytest.approx(1.4, abs=0.02)
-    value = table.set_index(["source", "volume_fraction"])["value"]
-    assert value["paper", 1e-3] == 1.39
-    assert value["random start", 1e-3] == 1.458
-    assert value["Del Bello 2017", 1e-3] == 4
-    batchelor = table[table["source"] == "Batchelor 1972"]
-    assert batchelor["value"].iloc[-1] == pytest.approx(1 - 6.55e-3)
+def test_inverse_beta_table_takes_the_lowest_galileo_number_and_the_end_where_nothing_is_steady():
+    runs = [run(galileo=0.156, mean=2.0), run(galileo=0.078, mean=1.4), rising(phi=1e-4)]
+    table = inverse_beta_table(steady_state(runs, 50.0, BOTH))
+    simulation = table[table["source"] == "simulation"].set_index("volume_fraction")
+    assert simulation["status"].to_dict() == {1e-4: DRIFTING, 1e-3: STEADY}
+    assert simulation.loc[1e-3, "value"] == pytest.approx(1.4, abs=0.02)
+    assert simulation.loc[1e-4, "value"] == pytest.approx(1.5, abs=0.02)
+    assert np.isnan(simulation.loc[1e-4, "low"])
+    start = table[table["source"] == "random start"].set_index("volume_fraction")["value"]
+    assert start[1e-3] == runs[1]["inverse_beta_mean"].values[0]
     with pytest.raises(ValueError, match="empty"):
-        inverse_beta_table(steady.iloc[:0])
+        inverse_beta_table(steady_state(runs, 50.0).iloc[:0])
+
+
+def test_the_papers_values_are_bounds_where_its_arrows_stop_short():
+    table = inverse_beta_table(steady_state([run()], 50.0, BOTH))
+    paper = table[table["source"] == "paper"].set_index("volume_fraction")
+    assert paper["relation"].to_dict() == {1e-3: ">=", 1e-4: "=", 1e-5: "="}
 
 
 def test_time_series_keep_first_and_last_step_and_the_lowest_galileo_number_and_seed():
@@ -141,15 +181,17 @@ def test_bad_series_are_refused():
     with pytest.raises(ValueError, match="ends at 100"):
         steady_state([run()], 200.0)
     with pytest.raises(ValueError, match="no variable 'lift'"):
-        steady_state([run()], 50.0, "lift")
+        steady_state([run()], 50.0, ["lift"])
     with pytest.raises(ValueError, match="at least 10 values"):
         steady_state([run()], 99.9)
     nameless = run()
     del nameless.attrs["galileo"]
     with pytest.raises(ValueError, match="'galileo'"):
         steady_state([nameless], 50.0)
-    with pytest.raises(ValueError, match="value 3 is not finite"):
-        mean_with_interval(np.array([1, 2, 3, np.nan] * 4))
+    unmeasured = run()
+    del unmeasured.attrs["stokes_number"]
+    with pytest.raises(ValueError, match="'stokes_number'"):
+        steady_state([unmeasured], 50.0)
     with pytest.raises(ValueError, match="two steps"):
         tracked_trajectories([run().isel(step=[0])])
     with pytest.raises(ValueError, match="at least one series"):

@@ -148,15 +148,22 @@ def test_pdf_table_names_galileo_numbers_as_multiples_of_the_lowest():
 
 def test_variance_table_stands_beside_the_settling_velocity_of_the_same_case():
     case = dict(zip(CASE, ("idnn", 60, 1e-3, 0.078), strict=True))
-    steady = pd.DataFrame([case | {"value": 1.4, "low": 1.3, "high": 1.5}])
+    found = {"status": "steady", "value": 1.4, "low": 1.3, "high": 1.5, "end": 1.6}
+    steady = pd.DataFrame([case | found])
     spheres = random_sphere_table([1e-3], seed=1, particles=100)
     table = voronoi_variance_table([cells()], steady, spheres, 50.0, seed=1)
-    assert set(table["source"]) == {"steady state", "random spheres", "random points", "paper"}
+    assert set(table["source"]) == {"simulation", "random spheres", "random points", "paper"}
     ours = table[table["source"] != "paper"].set_index("source")
     assert (ours["inverse_beta"] == 1.4).all()
     assert ours.loc["random points", "variance"] == pytest.approx(0.89516)
     found = pooled_volumes([cells()], 50.0).var(axis=1).mean()
-    assert ours.loc["steady state", "variance"] == pytest.approx(found / 0.2)
+    assert ours.loc["simulation", "variance"] == pytest.approx(found / 0.2)
+    drifting = steady.assign(status="drifting", value=np.nan, low=np.nan, high=np.nan)
+    later = voronoi_variance_table([cells()], drifting, spheres, 50.0, seed=1).set_index("source")
+    assert later.loc["simulation", "inverse_beta"] == 1.6
+    last = pooled_volumes([cells()], 100.0)
+    assert last.shape == (1, 60)
+    assert later.loc["simulation", "variance"] == pytest.approx(last.var() / 0.2)
     expected = random_sphere_variance(1e-3, 100, seed=1)
     assert ours.loc["random spheres", "high"] == pytest.approx(expected["high"] / 0.2)
     with pytest.raises(ValueError, match="steady states has no row for"):

@@ -1,16 +1,3 @@
-rule data_summary:
-    """What the paper states of its forces, and all rank correlations, for each radial law."""
-    input:
-        data="results/dataset/forces.h5",
-        library=library("data_summary.py"),
-    output:
-        "results/dataset/summary.json",
-    log:
-        "logs/data_summary.log",
-    script:
-        "../scripts/data_summary.py"
-
-
 rule dataset:
     """Join the shards, check them and keep the scenes that converged."""
     input:

@@ -1,58 +1,3 @@
-rule steady_state:
-    """Average every case over its steady state."""
-    input:
-        series=expand("results/sedimentation/{case}.series.nc", case=CASES),
-        library=library("steady_state.py"),
-    output:
-        report(
-            "results/analysis/steady_state.csv",
-            category="Sedimentation",
-            caption="../report/steady_state.rst",
-        ),
-    log:
-        "logs/analysis/steady_state.log",
-    params:
-        statistics_from=config["sedimentation"]["statistics_from"],
-    script:
-        "../scripts/steady_state.py"
-
-
-rule independence_of_n:
-    """Test whether the averages hang on the number of particles."""
-    input:
-        steady="results/analysis/steady_state.csv",
-        library=library("independence_of_n.py"),
-    output:
-        report(
-            "results/analysis/independence_of_n.csv",
-            category="Sedimentation",
-            caption="../report/independence_of_n.rst",
-        ),
-    log:
-        "logs/analysis/independence_of_n.log",
-    script:
-        "../scripts/independence_of_n.py"
-
-
-rule neighbour_changes:
-    """Count how often the five nearest neighbours change."""
-    input:
-        series=expand("results/sedimentation/{case}.series.nc", case=CASES),
-        library=library("neighbour_changes.py"),
-    output:
-        report(
-            "results/analysis/neighbour_changes.csv",
-            category="Sedimentation",
-            caption="../report/neighbour_changes.rst",
-        ),
-    log:
-        "logs/analysis/neighbour_changes.log",
-    params:
-        statistics_from=config["sedimentation"]["statistics_from"],
-    script:
-        "../scripts/neighbour_changes.py"
-
-
 rule figure_force_scatter:
     """Force components against volume fraction."""
     input:
@@ -265,41 +210,6 @@ rule movie:
         pictures=config["figures"]["movie_pictures"],
     script:
         "../scripts/movie.py"
-
-
-rule voronoi_cells:
-    """Volumes of the Voronoi cells in some frames of a case."""
-    input:
-        trajectory="results/sedimentation/{case}.nc",
-        library=library("voronoi_cells.py"),
-    output:
-        "results/analysis/voronoi/{case}.nc",
-    log:
-        "logs/analysis/voronoi/{case}.log",
-    benchmark:
-        "benchmarks/analysis/voronoi/{case}.tsv"
-    params:
-        statistics_from=config["sedimentation"]["statistics_from"],
-        snapshots=config["figures"]["snapshots"],
-    script:
-        "../scripts/voronoi_cells.py"
-
-
-rule random_spheres:
-    """Voronoi volumes of random spheres, to compare the settling ones with."""
-    input:
-        library=library("random_spheres.py"),
-    output:
-        "results/analysis/random_spheres.csv",
-    log:
-        "logs/analysis/random_spheres.log",
-    benchmark:
-        "benchmarks/analysis/random_spheres.tsv"
-    params:
-        seed=config["seed"],
-        volume_fractions=config["sedimentation"]["volume_fractions"],
-    script:
-        "../scripts/random_spheres.py"
 
 
 rule figure_voronoi_pdf:

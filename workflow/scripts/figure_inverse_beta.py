@@ -11,6 +11,6 @@ from dustfall.figures.style import save
 
 joblog.start(snakemake.log[0])
 
-steady = pd.read_csv(snakemake.input.steady, float_precision="round_trip")
-table = inverse_beta_table(steady[steady["quantity"] == "settling_velocity_mean"])
+steady = pd.read_csv(snakemake.input.steady)
+table = inverse_beta_table(steady)
 save(inverse_beta(table), table, Path(snakemake.output.png).with_suffix(""))

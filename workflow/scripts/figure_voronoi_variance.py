@@ -13,9 +13,9 @@ from dustfall.figures.voronoi import voronoi_variance
 joblog.start(snakemake.log[0])
 
 params = snakemake.params
-steady = pd.read_csv(snakemake.input.steady, float_precision="round_trip")
+steady = pd.read_csv(snakemake.input.steady)
 steady = steady[steady["quantity"] == "settling_velocity_mean"]
-spheres = pd.read_csv(snakemake.input.spheres, float_precision="round_trip")
+spheres = pd.read_csv(snakemake.input.spheres)
 cells = [xr.open_dataset(path) for path in snakemake.input.cells]
 table = voronoi_variance_table(cells, steady, spheres, params.statistics_from, params.seed)
 save(voronoi_variance(table), table, Path(snakemake.output.png).with_suffix(""))

@@ -8,6 +8,6 @@ from dustfall.files import atomic
 
 joblog.start(snakemake.log[0])
 
-steady = pd.read_csv(snakemake.input.steady, float_precision="round_trip")
+steady = pd.read_csv(snakemake.input.steady)
 with atomic(snakemake.output[0]) as path:
     independence_of_n(steady).to_csv(path, index=False)

@@ -5,7 +5,7 @@ from pathlib import Path
 import pandas as pd
 
 import joblog
-from dustfall.analysis.evaluation import prediction_cost
+from dustfall.benchmarks.cost import prediction_cost
 from dustfall.dataset import read
 from dustfall.figures.forces import accuracy_vs_cost
 from dustfall.figures.style import save

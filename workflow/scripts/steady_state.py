@@ -1,6 +1,5 @@
-"""Average the series of every case over its steady state, with confidence intervals."""
+"""Average the series of every case that is steady, with confidence intervals."""
 
-import pandas as pd
 import xarray as xr
 
 import joblog
@@ -17,7 +16,6 @@ quantities = [
     "new_neighbours",
 ]
 runs = [xr.load_dataset(path) for path in snakemake.input.series]
-start = snakemake.params.statistics_from
-table = pd.concat([steady_state(runs, start, quantity) for quantity in quantities])
+table = steady_state(runs, snakemake.params.statistics_from, quantities)
 with atomic(snakemake.output[0]) as path:
     table.to_csv(path, index=False)
