@@ -19,8 +19,12 @@ Key = tuple[str, ...]
 """The names that lead to a key or to a section; of the whole configuration, none."""
 
 
+PLAN = "plan"
+"""Reader of what stands among the inputs of any rule: it decides which jobs there are."""
+
+
 def readers() -> dict[str, frozenset[Key]]:
-    """Map each rule that makes a file to the keys and sections that it reads, in their order."""
+    """Map the plan, and each rule that makes a file, to the keys and sections that it reads."""
     snakefile = _tree(ROOT / "Snakefile")
     included = [
         _tree(ROOT / ast.literal_eval(node.args[0]))
@@ -28,12 +32,14 @@ def readers() -> dict[str, frozenset[Key]]:
         if isinstance(node, ast.Call) and ast.unparse(node.func) == "workflow.include"
     ]
     names: dict[str, ast.AST] = {}
-    rules: dict[str, list[ast.expr]] = {}
+    rules: dict[str, list[ast.expr]] = {PLAN: []}
     for tree in (_tree(ROOT / "workflow" / "plan.py"), *included, snakefile):
         for node in tree.body:
             match node:
                 case ast.FunctionDef(name=name, decorator_list=[_, *_] as lines):
-                    if any(ast.unparse(line).startswith("workflow.output(") for line in lines):
+                    directives = {ast.unparse(line).split("(")[0]: line for line in lines}
+                    rules[PLAN] += filter(None, [directives.get("workflow.input")])
+                    if "workflow.output" in directives:
                         rules[name.removeprefix("__rule_")] = lines
                 case ast.FunctionDef(name=name):
                     names[name] = node
@@ -46,7 +52,7 @@ def readers() -> dict[str, frozenset[Key]]:
 
 
 def read_by(key: str, found: dict[str, frozenset[Key]]) -> list[str]:
-    """Rules, of those that `readers` found, that read a key written with dots.
+    """The readers, of those that `readers` found, of a key written with dots.
 
     The rule that writes the whole configuration down is left out.
     """

@@ -63,9 +63,9 @@ def test_rules_read_every_key_and_no_other():
         # In a parameter; through a constant of the rules; through functions of the plan; where a
         # function names a section; in a resource.
         ("studies.together", ["step_size"]),
-        ("idnn.layers", ["winner"]),
+        ("idnn.layers", ["plan", "winner"]),
         ("idnn.training_of.anchored.epochs", ["model", "trial"]),
-        ("dataset.test_share", ["sweep", "model", "trial", "learning_curve", "evaluation"]),
+        ("dataset.test_share", ["plan", "sweep", "model", "trial", "learning_curve", "evaluation"]),
         ("sedimentation.checkpoint_interval", ["sedimentation", "study_of_a_step"]),
     ],
 )
