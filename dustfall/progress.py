@@ -20,7 +20,7 @@ class Progress:
         self.stream = stream or sys.stderr
         self.start = time.monotonic()
         self.last_line = self.start
-        self.bar = None
+        self.bar: tqdm | None = None
 
     def report(self, done: int, total: int) -> None:
         """Note that `done` of `total` items are finished."""

@@ -11,10 +11,21 @@ from pathlib import Path
 import jsonschema
 import yaml
 
+from dustfall.forces.registry import settling_models, trained_models
+from dustfall.scenes import LAWS
+from workflow.readers import read_by, readers
+
 SCHEMA = Path(__file__).parent / "schemas" / "config.schema.yaml"
 
-NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+ENUMS = {
+    "radial laws": list(LAWS),
+    "settling models": settling_models(),
+    "settling models and formulas": ["formulas", *settling_models()],
+    "trained models": trained_models(),
+}
+"""The lists of the library that the schema names by `enum_of`."""
 
+NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 STEADY_STEPS = 20
 """Fewest steps that a steady state is averaged, and its spectrum taken, over."""
@@ -25,8 +36,8 @@ class ConfigurationError(ValueError):
 
 
 def load_schema() -> dict:
-    """Read the JSON schema of the configuration."""
-    return yaml.safe_load(SCHEMA.read_text(encoding="utf-8"))
+    """Read the JSON schema of the configuration, with the library's lists where it names them."""
+    return _with_enums(yaml.safe_load(SCHEMA.read_text(encoding="utf-8")))
 
 
 def configure(settings: dict) -> dict:
@@ -50,13 +61,9 @@ def defaults(schema: dict) -> object:
 
 
 def keys(schema: dict, path: str = "") -> dict[str, dict]:
-    """Map each key that holds a value, written with dots, to its part of the schema.
-
-    `read_by` of a section, the rules that read it, holds for those of its keys that have none.
-    """
-    found = {}
+    """Map each key that holds a value, written with dots, to its part of the schema."""
+    found: dict[str, dict] = {}
     for name, part in schema["properties"].items():
-        part = {"read_by": schema.get("read_by", "")} | part
         name = f"{path}{name}"
         found |= keys(part, f"{name}.") if "properties" in part else {name: part}
     return found
@@ -64,15 +71,28 @@ def keys(schema: dict, path: str = "") -> dict[str, dict]:
 
 def reference() -> str:
     """Table of all keys in Markdown."""
+    found = readers()
     rows = ["| key | meaning | unit | allowed | default | read by |", "|---|---|---|---|---|---|"]
     for name, part in keys(load_schema()).items():
         default = part["default"]
         shown = ", ".join(map(_show, default)) if isinstance(default, list) else _show(default)
         rows.append(
             f"| `{name}` | {part['description']} | {part.get('unit', '')} "
-            f"| {_allowed(part)} | {shown} | {part['read_by']} |"
+            f"| {_allowed(part)} | {shown} | {', '.join(read_by(name, found))} |"
         )
     return "\n".join(rows)
+
+
+def _with_enums(schema):
+    """A part of the schema with `enum` in place of `enum_of`."""
+    if isinstance(schema, list):
+        return [_with_enums(part) for part in schema]
+    if not isinstance(schema, dict):
+        return schema
+    return {
+        "enum" if key == "enum_of" else key: ENUMS[part] if key == "enum_of" else _with_enums(part)
+        for key, part in schema.items()
+    }
 
 
 def _complete(value, schema, path=""):
@@ -141,7 +161,8 @@ def _allowed(schema: dict) -> str:
         "array": "a list",
     }[schema["type"]]
     if schema["type"] == "array":
-        return f"{kind} of at least one value and no value twice, each {_allowed(schema['items'])}"
+        fewest = " of at least one value and" if schema.get("minItems") else ","
+        return f"{kind}{fewest} no value twice, each {_allowed(schema['items'])}"
     bounds = {
         "minimum": "at least",
         "exclusiveMinimum": "above",

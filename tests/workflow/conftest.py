@@ -20,6 +20,7 @@ class Project:
         for name in ("config", "dustfall", "profiles", "workflow"):
             shutil.copytree(ROOT / name, folder / name)
         shutil.copy2(ROOT / "Snakefile", folder)
+        self.rules: set[str] = set()
 
     def snakemake(self, *arguments: str) -> subprocess.CompletedProcess:
         environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
@@ -36,17 +37,24 @@ class Project:
         done = self.snakemake(*arguments)
         assert done.returncode == 0, done.stdout + done.stderr
 
-    def plan(self, *arguments: str) -> dict[str, int]:
-        """Jobs that a dry run announces, by rule; the target rule `all` is left out."""
+    def dry_run(self, *arguments: str) -> str:
         done = self.snakemake("--dry-run", *arguments)
         assert done.returncode == 0, done.stdout + done.stderr
-        words = done.stdout + done.stderr
-        if "Nothing to be done" in words:
-            return {}
-        table = words.split("Job stats:")[1].split("total")[0]
-        jobs = {rule: int(count) for rule, count in re.findall(r"^(\w+) +(\d+)$", table, re.M)}
-        jobs.pop("all", None)
-        return jobs
+        return done.stdout + done.stderr
+
+    def plan(self, *arguments: str) -> dict[str, int]:
+        """Jobs that a dry run announces, by rule; the target rule `all` is left out."""
+        return jobs_of(self.dry_run(*arguments))
+
+
+def jobs_of(words: str) -> dict[str, int]:
+    """Jobs by rule, from the words of a dry run; the target rule `all` is left out."""
+    if "Nothing to be done" in words:
+        return {}
+    table = words.split("Job stats:")[1].split("total")[0]
+    jobs = {rule: int(count) for rule, count in re.findall(r"^(\w+) +(\d+)$", table, re.M)}
+    jobs.pop("all", None)
+    return jobs
 
 
 @pytest.fixture
@@ -60,3 +68,19 @@ def campaign(tmp_path_factory) -> Project:
     campaign = Project(tmp_path_factory.mktemp("campaign"))
     campaign.run("--configfile", "config/smoke.yaml", "--", "all")
     return campaign
+
+
+@pytest.fixture(scope="module")
+def rehearsal(tmp_path_factory) -> Project:
+    """The smoke campaign as if it had run: every file is there and empty, and recorded as made."""
+    rehearsal = Project(tmp_path_factory.mktemp("rehearsal"))
+    arguments = ("--configfile", "config/smoke.yaml")
+    words = rehearsal.dry_run(*arguments, "--", "all")
+    for line in re.findall("^    output: (.*)$", words, re.M):
+        for name in line.split(", "):
+            path = rehearsal.folder / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.touch()
+    rehearsal.rules = set(jobs_of(words))
+    rehearsal.run(*arguments, "--touch", "--forceall", "--", "all")
+    return rehearsal

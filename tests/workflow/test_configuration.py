@@ -1,13 +1,15 @@
 """The configuration is complete, documented, and refused with one sentence where it is wrong."""
 
-import re
 from pathlib import Path
 
 import pytest
 import yaml
 
+from dustfall.forces.registry import trained_models
+from dustfall.scenes import LAWS
 from workflow import configuration
 from workflow.configuration import ConfigurationError, configure, keys, load_schema
+from workflow.readers import read_by, readers
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -39,29 +41,46 @@ def test_readme_tabulates_the_schema():
     assert configuration.reference() in (ROOT / "config/README.md").read_text()
 
 
-def test_every_key_has_a_meaning_and_a_reader():
+def test_every_key_has_a_meaning():
     for key, part in keys(load_schema()).items():
         assert part["description"], key
-        assert part["read_by"], key
 
 
 def test_rules_read_every_key_and_no_other():
-    files = [ROOT / "Snakefile", ROOT / "workflow/plan.py", *ROOT.glob("workflow/rules/*.smk")]
-    code = "\n".join(path.read_text() for path in files)
-    # plan.py names two sections that it reads several keys of.
-    code = code.replace("settle[", 'config["sedimentation"][')
-    code = code.replace("galileo[", 'config["sedimentation"]["galileo"][')
-    read = {
-        ".".join(re.findall(r'"(\w+)"', access))
-        for access in re.findall(r'config((?:\["\w+"\])+)', code)
-    }
-    known = keys(load_schema())
+    found, known = readers(), keys(load_schema())
     for key in known:
-        assert any(f"{key}.".startswith(f"{path}.") for path in read), f"{key} is read nowhere"
-    for path in read:
-        assert any(f"{key}.".startswith(f"{path}.") for key in known), (
-            f"{path} is not in the schema"
+        assert read_by(key, found), f"{key} is read nowhere"
+    for path in set().union(*found.values()):
+        name = ".".join(path)
+        assert any(f"{key}.".startswith(f"{name}." if name else "") for key in known), (
+            f"{name} is not in the schema"
         )
+
+
+@pytest.mark.parametrize(
+    ("key", "rules"),
+    [
+        # In a parameter; through a constant of the rules; through functions of the plan; where a
+        # function names a section; in a resource.
+        ("studies.together", ["step_size"]),
+        ("idnn.layers", ["plan", "winner"]),
+        ("idnn.training_of.anchored.epochs", ["model", "trial"]),
+        ("dataset.test_share", ["plan", "sweep", "model", "trial", "learning_curve", "evaluation"]),
+        ("sedimentation.checkpoint_interval", ["sedimentation", "study_of_a_step"]),
+    ],
+)
+def test_a_key_is_read_by_the_rules_that_look_it_up_by_whatever_way(key, rules):
+    assert set(read_by(key, readers())) == set(rules)
+
+
+def test_models_that_have_settings_of_their_own_are_models_that_a_campaign_trains():
+    idnn = configure({})["idnn"]
+    for section in ("laws_of", "layers_of", "training_of"):
+        assert set(idnn[section]) <= set(trained_models()), section
+
+
+def test_scenes_are_drawn_of_every_radial_law():
+    assert list(configure({})["scenes"]["number"]) == list(LAWS)
 
 
 def test_what_is_left_out_has_its_default():
@@ -119,7 +138,7 @@ REFUSED = [
     ("sedimentation.galileo.particles", 3, "galileo.particles is 3, but must be a whole number"),
     ("sedimentation.properties.viscosity", 0, "viscosity is 0, but must be a number above 0."),
     ("sedimentation.properties.particle_density", 1.0, "is 1 kg/m³, but must be above"),
-    ("sedimentation.model", "idn", "sedimentation.model is idn, but must be one of anchored,"),
+    ("sedimentation.model", "idn", "sedimentation.model is idn, but must be one of isolated,"),
     ("sedimentation.statistics_from", 100, "is 100 response times, but must be at most 98"),
     ("sedimentation.duration", 100.01, "duration is 100.01 response times, but must be a multiple"),
     ("sedimentation.save_every", 0.07, "save_every is 0.07 response times, but must be a multiple"),
