@@ -5,7 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from dustfall.forces.formulas import FORMULAS
+from dustfall.forces.formulas.isolated import MODEL as ISOLATED
+from dustfall.forces.formulas.reflections import MODEL as REFLECTIONS
+from dustfall.forces.formulas.rotne_prager import MODEL as ROTNE_PRAGER
 from dustfall.forces.frames import (
     canonical_frame,
     hold_at_contact,
@@ -123,6 +125,9 @@ class Scenes:
         return self.baseline[:, COMPONENTS[component]] + residual
 
 
+BASELINES = {formula.name: formula for formula in (ISOLATED, ROTNE_PRAGER, REFLECTIONS)}
+"""Formulas that networks may stand on."""
+
 _FADING = {"isolated": 1, "rotne_prager": 1, "reflections": 4}
 """Power of 1/distance by which what the networks add to a baseline falls, as its error does."""
 
@@ -153,7 +158,7 @@ def describe(kind: str, neighbours: np.ndarray, radial_input: str, largest: floa
         radius = np.minimum(inputs[:, :, 0], largest)
         inputs[:, :, 0] = np.log(radius) if radial_input == "logarithm" else radius
         envelope = np.repeat(fade[:, None], len(first), axis=1)
-    return Scenes(inputs, envelope, FORMULAS[layout.baseline].force(neighbours), axes)
+    return Scenes(inputs, envelope, BASELINES[layout.baseline].force(neighbours), axes)
 
 
 @njit(cache=True, nogil=True)

@@ -5,7 +5,8 @@ Configuration, plan, tables and figures ask here; a model is entered once, as a 
 """
 
 from dustfall.forces.features import KINDS, Kind
-from dustfall.forces.formulas import FORMULAS, Formula
+from dustfall.forces.formula import Formula
+from dustfall.forces.formulas import FORMULAS
 
 FORCE_MODELS: dict[str, Formula | Kind] = {**FORMULAS, **KINDS}
 

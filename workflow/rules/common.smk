@@ -17,6 +17,16 @@ def library(script):
     return [os.path.normpath(os.path.join(root, file)) for file in files]
 
 
+def settling_library(model):
+    """Library files that settling with a force model runs: those of its formula, if it is one."""
+    files = library("settle.py")
+    formula = ROOT / "dustfall" / "forces" / "formulas" / f"{model}.py"
+    if model not in LEARNED_MODELS:
+        own = [formula, *(ROOT / file for file in library_files(formula))]
+        files = sorted({*files, *(os.path.relpath(file) for file in own)})
+    return files
+
+
 def figure(name, category):
     """Outputs of a figure: the picture for the report, the one for print, the numbers drawn."""
     stem = f"results/figures/{name}"

@@ -3,7 +3,7 @@ rule sedimentation:
     input:
         model=lambda wc: trained(plan.force_model(config, wc.case)),
         start=lambda wc: plan.start_file(config, wc.case),
-        library=library("settle.py"),
+        library=lambda wc: settling_library(plan.force_model(config, wc.case)),
     output:
         trajectory="results/sedimentation/{case}.nc",
         series="results/sedimentation/{case}.series.nc",

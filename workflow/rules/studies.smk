@@ -7,7 +7,7 @@ rule study_of_a_step:
             otherwise=[],
         ),
         start=[],
-        library=library("settle.py"),
+        library=settling_library(config["sedimentation"]["model"]),
     output:
         trajectory=temp("results/studies/{case}.nc"),
         series="results/studies/{case}.series.nc",

@@ -5,7 +5,7 @@ import shutil
 from pathlib import Path
 
 import joblog
-from dustfall.forces.formulas import FORMULAS
+from dustfall.forces.formula import load_formula
 from dustfall.forces.learned import load_model
 from dustfall.sedimentation.closures.nearest_neighbours import NearestNeighbours
 from dustfall.sedimentation.properties import Properties
@@ -16,7 +16,7 @@ progress = joblog.start(snakemake.log[0])
 params, case = snakemake.params, snakemake.wildcards.case
 
 learned = snakemake.input.model
-model = load_model(learned) if learned else FORMULAS[params.model]
+model = load_model(learned) if learned else load_formula(params.model)
 if snakemake.input.start:
     position, velocity = read_start(snakemake.input.start, params.particles, params.volume_fraction)
     start = start_from(

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dustfall.forces.formulas import Formula
+from dustfall.forces.formula import Formula
 from dustfall.units import STOKES_DRAG
 
 

@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 
-from dustfall.forces.formulas import Formula
+from dustfall.forces.formula import Formula
 from dustfall.stokes.references.exact_pairs import pair_drag
 from dustfall.suspension.few_spheres import NO_CORRECTION, POWER, TERMS, forces_among_neighbours
 from dustfall.units import STOKES_DRAG

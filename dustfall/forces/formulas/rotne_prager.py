@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dustfall.forces.formulas import Formula
+from dustfall.forces.formula import Formula
 from dustfall.suspension.few_spheres import NO_CORRECTION, forces_among_neighbours
 
 
