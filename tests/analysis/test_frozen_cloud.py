@@ -48,15 +48,15 @@ def test_the_whole_cloud_settles_as_slowly_as_theory_says_and_a_fixed_bed_resist
 
 
 def test_the_table_holds_its_panels_and_does_not_depend_on_order():
-    table = frozen_cloud_table([1e-5, 1e-3], 100, 2, seed=1)
+    table = frozen_cloud_table([1e-5, 1e-3], 120, 2, seed=1)
     assert set(table["panel"]) == {"neighbours", "particles", "correlation", "settling", "drag"}
-    assert (table["panel"] == "particles").sum() == 100
+    assert (table["panel"] == "particles").sum() == 120
     settling = table[table["panel"] == "settling"].set_index(["source", "x"])
     five = settling.loc[("five neighbours", 1e-3)]
     assert five["low"] < five["y"] < five["high"]
     assert 1.3 < five["y"] < 1.6
     assert abs(settling.loc[("all particles", 1e-5), "y"] - 1) < 0.05
-    few = frozen_cloud_table([1e-4, 1e-5], 100, 2, seed=1)
+    few = frozen_cloud_table([1e-4, 1e-5], 120, 2, seed=1)
     first = settling.loc[("five neighbours", 1e-5), "y"]
     assert few.set_index(["panel", "source", "x"]).loc[
         ("settling", "five neighbours", 1e-5), "y"
