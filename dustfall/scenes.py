@@ -2,7 +2,8 @@
 
 import numpy as np
 
-NEIGHBOURS = 5
+from dustfall.streams import Purpose, stream
+from dustfall.units import NEIGHBOURS, SPHERE_VOLUME
 
 LAWS = ("uniform", "ball", "contact")
 """Radial laws: `uniform`, radii uniform between contact and the fifth distance (the law that
@@ -13,17 +14,24 @@ NEAR_CONTACT = (1e-3, 0.1)
 """Gap [d_p] of the nearly touching neighbour of the law `contact`, uniform in this range: scenes
 that are rare under the other laws, and the hardest to predict."""
 
-_MOST_DRAWS = 10_000
+FIFTH_SHELL = 15.0 * SPHERE_VOLUME / (4.0 * np.pi)
+"""phi d_5^3 [d_p^3]: five spheres in the ball that reaches to the centre of the fifth."""
+
+DENSEST = FIFTH_SHELL / 2.0**3
+"""Volume fraction of d_5 = 2 d_p, where random placement without overlap is still quick."""
+
+MOST_DRAWS = 10_000
+"""Draws after which a scene is given up; at `DENSEST` a few hundred suffice."""
 
 
 def volume_fraction(d5):
     """phi = 15 V_p / (4 pi d_5^3), d5 [d_p] the distance of the fifth neighbour (paper, Eq. 6)."""
-    return 15.0 / (24.0 * np.asarray(d5, dtype=float) ** 3)
+    return FIFTH_SHELL / np.asarray(d5, dtype=float) ** 3
 
 
 def fifth_distance(phi):
     """Distance [d_p] of the fifth neighbour at volume fraction phi: `volume_fraction` inverted."""
-    return np.cbrt(15.0 / (24.0 * np.asarray(phi, dtype=float)))
+    return np.cbrt(FIFTH_SHELL / np.asarray(phi, dtype=float))
 
 
 def random_scene(seed: int, law: str, number: int, phi_range) -> tuple[np.ndarray, float]:
@@ -31,27 +39,25 @@ def random_scene(seed: int, law: str, number: int, phi_range) -> tuple[np.ndarra
 
     log(phi) is uniform over phi_range; the fifth neighbour lies at `fifth_distance(phi)`, the
     other four as the radial law says; directions are isotropic. A neighbour that overlaps an
-    earlier one is drawn again. The random stream hangs on (seed, law, number) alone.
+    earlier one is drawn again. The random stream depends on (seed, law, number) alone.
 
     Raises ValueError if the law is unknown or the range cannot hold five neighbours.
     """
     if law not in LAWS:
         raise ValueError(f"radial law {law!r}: allowed are {', '.join(LAWS)}")
     low, high = phi_range
-    # Five neighbours need room: at d_5 = 2 d_p a random placement without overlap is still quick.
-    densest = float(volume_fraction(2.0))
-    if not 0.0 < low <= high <= densest:
+    if not 0.0 < low <= high <= DENSEST:
         raise ValueError(
-            f"phi range {low} to {high}: allowed are 0 < lowest <= highest <= {densest:.4g}"
+            f"phi range {low} to {high}: allowed are 0 < lowest <= highest <= {DENSEST:.4g}"
         )
-    rng = np.random.default_rng([seed, LAWS.index(law), number])
+    rng = stream(Purpose.SCENE, seed, LAWS.index(law), number)
     phi = float(np.exp(rng.uniform(np.log(low), np.log(high))))
     d5 = float(fifth_distance(phi))
     placed = [np.zeros(3), d5 * _direction(rng)]
     draws = 0
     while len(placed) <= NEIGHBOURS:
         draws += 1
-        if draws > _MOST_DRAWS:
+        if draws > MOST_DRAWS:
             raise ValueError(f"scene {number}: no room for five neighbours at phi = {phi:.3g}")
         if law == "contact" and len(placed) == 2:
             radius = 1.0 + rng.uniform(*NEAR_CONTACT)

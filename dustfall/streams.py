@@ -22,9 +22,9 @@ class Purpose(IntEnum):
     START = 8  # case
     TRACKED = 9  # case
     PROBES = 10
-    RANDOM_SPHERES = 11  # volume fraction, cloud
-    FROZEN_CLOUD = 12  # volume fraction, cloud
-    BOOTSTRAP = 13  # sample
+    RANDOM_SPHERES = 11  # cloud
+    FROZEN_CLOUD = 12  # cloud
+    BOOTSTRAP = 13  # number of samples
     AUDIT = 14  # radial law, decade
     BENCHMARK = 15  # set, number
     STRESS = 16  # test, number

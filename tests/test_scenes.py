@@ -1,4 +1,4 @@
-"""Random scenes follow their law, and each hangs on the seed and its own number alone."""
+"""Random scenes follow their law, and each depends on the seed and its own number alone."""
 
 import numpy as np
 import pytest
@@ -6,6 +6,7 @@ from scipy.spatial.distance import pdist
 from scipy.stats import kstest
 
 from dustfall.scenes import (
+    DENSEST,
     LAWS,
     NEAR_CONTACT,
     fifth_distance,
@@ -50,13 +51,12 @@ def test_scenes_follow_their_law(law):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_no_spheres_overlap_in_the_densest_scenes(law):
-    densest = float(volume_fraction(2.0))
-    neighbours, _ = random_scenes(1, law, range(600), (densest, densest))
+    neighbours, _ = random_scenes(1, law, range(600), (DENSEST, DENSEST))
     spheres = np.concatenate([np.zeros((600, 1, 3)), neighbours], axis=1)
     assert min(pdist(own).min() for own in spheres) > 1.0
 
 
-def test_a_scene_hangs_on_seed_law_and_number_alone():
+def test_a_scene_depends_on_seed_law_and_number_alone():
     together, phi = random_scenes(7, "uniform", range(20), RANGE)
     alone, own = random_scene(7, "uniform", 13, RANGE)
     np.testing.assert_array_equal(together[13], alone)

@@ -10,62 +10,65 @@ from dustfall.forces.formulas import FORMULAS
 from dustfall.sedimentation.neighbours import nearest_neighbours
 from dustfall.sedimentation.start import random_positions
 from dustfall.sedimentation.state import box_length
+from dustfall.streams import Purpose, stream
 from dustfall.suspension.periodic import HASIMOTO, periodic_mobility
 from dustfall.suspension.rotne_prager import rotne_prager_forces
-from dustfall.units import RADIUS, STOKES_DRAG
+from dustfall.units import AXES, RADIUS, STOKES_DRAG
 
-FLOW = 1
-"""Axis of the flow, as in the force models: y."""
+FLOW = AXES["streamwise"]
 
 COUNTS = (1, 2, 5, 10, 20, 50, 100, 200, 400)
 """Neighbours that a particle is given in turn."""
+
+SAFETY = 5
+"""Standard deviations of the number of particles in a ball that its mean must leave room for."""
 
 REFERENCES = 25
 """Particles of a cloud that are given many neighbours, each a dense system of its own."""
 
 
-def five_neighbour_drag(positions, side: float) -> np.ndarray:
+def five_neighbour_drag(positions, length: float) -> np.ndarray:
     """Drag (n,) over Stokes drag on each sphere of a periodic cloud fixed in a uniform flow.
 
     Each sphere sees its five nearest alone, in unbounded fluid (inverted Rotne-Prager mobility).
     """
-    neighbours, _ = nearest_neighbours(positions, side)
+    neighbours, _ = nearest_neighbours(positions, length)
     return FORMULAS["rotne_prager"].predict(neighbours)[:, FLOW] / STOKES_DRAG
 
 
-def drag_among_nearest(positions, side: float, references, count: int) -> np.ndarray:
+def drag_among_nearest(positions, length: float, references, count: int) -> np.ndarray:
     """Drag over Stokes drag on some spheres of a periodic cloud, each among its `count` nearest.
 
-    Raises ValueError where these would reach beyond half the side, where images are met twice.
+    Raises ValueError where these would reach beyond half the box, where images are met twice.
     """
-    tree = cKDTree(positions % side, boxsize=side)
-    distance, index = tree.query(positions[references] % side, count + 1)
-    if distance.max() > side / 2:
+    tree = cKDTree(positions % length, boxsize=length)
+    distance, index = tree.query(positions[references] % length, count + 1)
+    if distance.max() > length / 2:
         raise ValueError(
-            f"{count} neighbours reach {distance.max():.4g} d_p, more than half the side of "
-            f"{side:.4g} d_p; the cloud needs more than {len(positions)} particles"
+            f"{count} neighbours reach {distance.max():.4g} d_p, more than half the box length "
+            f"of {length:.4g} d_p; the cloud needs more than {len(positions)} particles"
         )
     drag = np.empty(len(index))
     for i, those in enumerate(index):
         centres = positions[those] - positions[those[0]]
-        centres -= side * np.rint(centres / side)
+        centres -= length * np.rint(centres / length)
         drag[i] = rotne_prager_forces(centres)[0, FLOW] / STOKES_DRAG
     return drag
 
 
-def all_particle_motion(positions, side: float) -> tuple[np.ndarray, np.ndarray]:
+def all_particle_motion(positions, length: float) -> tuple[np.ndarray, np.ndarray]:
     """Drag and settling velocity (n,) with all spheres and images, over those of a lone sphere.
 
     No net flux of spheres and fluid together (`periodic_mobility`). The drag is that on spheres
-    which all move with the same velocity, the velocity that under equal weights. A cube of finite
-    side slows the cloud by Hasimoto's correction, which is added back to the velocity, so that its
-    mean stands for an infinite suspension (Ladd 1990, J. Chem. Phys. 93, 3484).
+    which all move with the same velocity, the velocity that under equal weights. A finite cube
+    slows the cloud by Hasimoto's correction, which is added back to the velocity, so that its mean
+    stands for an infinite suspension (Ladd 1990, J. Chem. Phys. 93, 3484).
     """
-    mobility = periodic_mobility(positions, side)
+    mobility = periodic_mobility(positions, length)
     along = np.tile(np.eye(3)[FLOW], len(positions))
     drag = np.linalg.solve(mobility, along).reshape(-1, 3)[:, FLOW]
     velocity = (mobility @ along).reshape(-1, 3)[:, FLOW]
-    return drag, velocity + HASIMOTO * RADIUS / side
+    return drag, velocity + HASIMOTO * RADIUS / length
 
 
 def frozen_cloud_table(
@@ -75,6 +78,9 @@ def frozen_cloud_table(
 
     Parameters: `volume_fractions`, `particles` of a cloud, `clouds` of each volume fraction (at
     least two), `seed`, `progress` (clouds done, of all).
+
+    Clouds of one number are the same draws at each volume fraction, so that differences between
+    these are sharper than the intervals.
 
     Returns the columns panel, source, volume_fraction, x, y, low, high (95 % interval of the mean,
     from the spread between clouds). Panel "neighbours": mean drag y among x neighbours in unbounded
@@ -87,16 +93,20 @@ def frozen_cloud_table(
     """
     if clouds < 2:
         raise ValueError(f"clouds is {clouds}: an interval needs at least 2")
-    counts = [count for count in COUNTS if count <= particles / 2.2]
+    # Beyond half the box length images are met twice; a ball of that size holds pi/6 of the cloud,
+    # give or take its scatter.
+    share = np.pi / 6
+    surely = share * particles - SAFETY * np.sqrt(particles * share * (1 - share))
+    counts = [count for count in COUNTS if count <= surely]
     rows = []
     for case, phi in enumerate(volume_fractions):
         found: dict[tuple, list[float]] = {}
         for cloud in range(clouds):
-            rng = np.random.default_rng([seed, case, cloud])
-            side = box_length(particles, phi)
+            rng = stream(Purpose.FROZEN_CLOUD, seed, cloud)
+            length = box_length(particles, phi)
             positions = random_positions(rng, particles, phi)
-            five = five_neighbour_drag(positions, side)
-            drag, velocity = all_particle_motion(positions, side)
+            five = five_neighbour_drag(positions, length)
+            drag, velocity = all_particle_motion(positions, length)
             means = {
                 ("drag", "five neighbours", phi): five.mean(),
                 ("drag", "all particles", phi): drag.mean(),
@@ -107,7 +117,7 @@ def frozen_cloud_table(
                 ("settling", "all particles", phi): velocity.mean(),
             }
             for count in counts:
-                some = drag_among_nearest(positions, side, slice(REFERENCES), count)
+                some = drag_among_nearest(positions, length, slice(REFERENCES), count)
                 means["neighbours", "nearest neighbours", count] = some.mean()
             for key, value in means.items():
                 found.setdefault(key, []).append(value)

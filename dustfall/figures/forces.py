@@ -1,7 +1,5 @@
 """Figures of the data set and of the force models."""
 
-from itertools import cycle
-
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
@@ -9,11 +7,12 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from dustfall.figures.style import (
-    CATEGORY_COLOURS,
     COMPONENT_COLOURS,
     DOUBLE,
     SINGLE,
     letter,
+    model_look,
+    model_title,
     new_figure,
     phi_colour,
     require,
@@ -234,7 +233,7 @@ def predicted_vs_target(frame: pd.DataFrame) -> Figure:
                 rows["target"],
                 rows["predicted"],
                 s=4,
-                color=CATEGORY_COLOURS[column % len(CATEGORY_COLOURS)],
+                color=model_look(model)["color"],
                 alpha=0.5,
                 linewidths=0,
             )
@@ -250,7 +249,7 @@ def predicted_vs_target(frame: pd.DataFrame) -> Figure:
                 note = f"{outside} of {len(rows)} points outside"
                 ax.text(0.95, 0.05, note, transform=ax.transAxes, ha="right", fontsize=7)
             if row == 0:
-                ax.set_title(model)
+                ax.set_title(model_title(model))
             ax.set_xlabel(f"target {component} force {FORCE_UNIT}")
         axes[row, 0].set_ylabel(f"predicted {FORCE_UNIT}")
     return figure
@@ -267,9 +266,9 @@ def error_by_distance(frame: pd.DataFrame) -> Figure:
     require(frame, ["model", "gap", "rms_error", "largest_error"], "error_by_distance")
     figure = new_figure(SINGLE * 1.4, 3.4)
     ax = figure.subplots()
-    for model, colour in zip(frame["model"].unique(), cycle(CATEGORY_COLOURS), strict=False):
-        rows = frame[frame["model"] == model]
-        ax.plot(rows["gap"], rows["rms_error"], color=colour, label=model)
+    for model, rows in frame.groupby("model", sort=False):
+        colour = model_look(model)["color"]
+        ax.plot(rows["gap"], rows["rms_error"], color=colour, label=model_title(model))
         ax.plot(rows["gap"], rows["largest_error"], ".", color=colour, ms=3)
     ax.set_xscale("log")
     ax.set_yscale("log")
@@ -291,7 +290,7 @@ def learning_curve(frame: pd.DataFrame) -> Figure:
     require(frame, columns, "learning_curve")
     require_components(frame, ["streamwise", "lateral"], "learning_curve")
     models, laws = frame["model"].unique(), frame["radial_law"].unique()
-    colours = dict(zip(models, CATEGORY_COLOURS, strict=False))
+    looks = {model: model_look(model) for model in models}
     lines = dict(zip(laws, ("-", "--", ":"), strict=False))
     figure = new_figure(DOUBLE, 2.8)
     axes = figure.subplots(1, 2)
@@ -304,14 +303,14 @@ def learning_curve(frame: pd.DataFrame) -> Figure:
                 rows["training_scenes"],
                 1 - rows["r2"],
                 lines[law],
-                color=colours[model],
-                marker=".",
+                ms=3,
+                **looks[model],
             )
         ax.set_xscale("log")
         ax.set_yscale("log")
         ax.set_xlabel("training scenes")
         ax.set_ylabel(f"$1 - R^2$, {component}")
-    handles = [Line2D([], [], color=colours[model], label=model) for model in models]
+    handles = [Line2D([], [], ms=3, label=model_title(m), **looks[m]) for m in models]
     handles += [Line2D([], [], color="k", ls=lines[law], label=f"law {law}") for law in laws]
     figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))
     letter(axes)
@@ -331,9 +330,9 @@ def accuracy_vs_cost(frame: pd.DataFrame) -> Figure:
     axes = figure.subplots(1, 2)
     for ax, component in zip(axes, ("streamwise", "lateral"), strict=True):
         models = frame[frame["component"] == component].groupby("model", sort=False)
-        for (model, rows), marker in zip(models, cycle("osD^v<>Ph*"), strict=False):
-            name = model.replace("_", " ")
-            ax.plot(rows["microseconds"], 1 - rows["r2"], marker, ls="none", label=name)
+        for model, rows in models:
+            look = {"ls": "none", "label": model_title(model)} | model_look(model)
+            ax.plot(rows["microseconds"], 1 - rows["r2"], **look)
         ax.set_xscale("log")
         ax.set_yscale("log")
         ax.margins(0.1)

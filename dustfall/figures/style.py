@@ -2,7 +2,6 @@
 
 import functools
 from collections.abc import Callable, Iterable, Sequence
-from zlib import crc32
 
 import matplotlib as mpl
 import numpy as np
@@ -13,6 +12,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from dustfall.files import atomic
+from dustfall.forces import registry
+from dustfall.forces.formulas import FORMULAS
 
 STYLE = {
     "font.family": "STIXGeneral",
@@ -61,24 +62,10 @@ COMPONENT_COLOURS = {
 CATEGORY_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 """Okabe & Ito 2008."""
 
-MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+MODEL_COLOURS = (*CATEGORY_COLOURS, "#332288", "#882255", "#999933")
+"""Of force models: there are more of them than of other things; the last three of Paul Tol."""
 
-MODEL_TITLES = {
-    "idnn": "IDNN",
-    "anchored": "anchored IDNN",
-    "rotne_prager": "Rotne-Prager inverse",
-    "isolated": "isolated sphere (Stokes)",
-    "dense": "dense network",
-    "reflections": "two reflections",
-    "stokeslets": "Stokeslets",
-    "dense_sorted": "dense network, sorted neighbours",
-    "pairwise": "pairwise network",
-    "unit_vectors": "IDNN of unit vectors",
-    "canonical": "IDNN in the canonical frame",
-    "residual": "IDNN on Rotne-Prager",
-    "anchored_pairwise": "anchored pairwise network",
-}
-"""What a force model is called in a figure, by its name; the order is that of the looks."""
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 REFERENCE = "0.35"
 """Grey of reference lines and of other people's points."""
@@ -106,20 +93,25 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def model_title(model: str) -> str:
-    """What a force model is called in a figure: its title, or else its name in words."""
-    return MODEL_TITLES.get(model, model.replace("_", " "))
+    """What a force model is called in a figure: its title, without one its name as it is."""
+    return registry.title(model) if model in registry.FORCE_MODELS else model
 
 
 def model_look(model: str) -> dict[str, str]:
-    """Colour and marker of a force model, the same in all figures."""
-    known = list(MODEL_TITLES)
-    # Models that have no title yet share what the known ones leave over, by their name alone.
-    number = known.index(model) if model in known else len(known) + crc32(model.encode())
-    colours, markers = len(CATEGORY_COLOURS), len(MARKERS)
+    """Colour and marker of a force model, the same in all figures.
+
+    Closed formulas and the models that a campaign trains come first, with a colour for each; more
+    models than colours have other markers. A name that the registry lacks is drawn in grey.
+    """
+    first = [*FORMULAS, *registry.trained_models()]
+    known = first + [name for name in registry.FORCE_MODELS if name not in first]
+    if model not in known:
+        return {"color": REFERENCE, "marker": MARKERS[0]}
+    number = known.index(model)
+    colours = len(MODEL_COLOURS)
     return {
-        "color": CATEGORY_COLOURS[number % colours],
-        # One further on in each round of the colours, so that no two looks are the same.
-        "marker": MARKERS[(number + number // colours) % markers],
+        "color": MODEL_COLOURS[number % colours],
+        "marker": MARKERS[(number + number // colours) % len(MARKERS)],
     }
 
 

@@ -11,7 +11,9 @@ from dustfall.analysis.distributions import force_distributions, force_samples
 from dustfall.analysis.evaluation import error_by_gap
 from dustfall.analysis.mesh_study import mesh_study_table
 from dustfall.analysis.settling import inverse_beta_table
-from dustfall.figures.style import PHI_RANGE, STYLE, phi_colour, phi_label, save
+from dustfall.figures.style import PHI_RANGE, STYLE, model_look, phi_colour, phi_label, save
+from dustfall.forces.formulas import FORMULAS
+from dustfall.forces.registry import FORCE_MODELS, title, trained_models
 
 PHI = (1e-8, 1e-5, 1e-3)
 
@@ -56,13 +58,13 @@ def spearman():
 
 def predicted_vs_target():
     target = forces(50)[1]
-    models = {"IDNN": 0.98 * target, "dense": 0.9 * target, "anchored": target}
+    models = {"idnn": 0.98 * target, "dense": 0.9 * target, "anchored": target}
     return predictions_against_target(target, models)
 
 
 def error_by_distance():
     phi, target = forces(90)
-    return error_by_gap({"IDNN": 0.98 * target, "anchored": 1.001 * target}, target, phi * 1e6, 9)
+    return error_by_gap({"idnn": 0.98 * target, "anchored": 1.001 * target}, target, phi * 1e6, 9)
 
 
 def learning_curve():
@@ -341,10 +343,10 @@ def test_panels_with_two_views_draw_both():
 
 def test_force_models_stand_in_a_panel_of_their_own_at_the_n_that_they_share():
     left, right = figures.inverse_beta(inverse_beta()).axes
-    assert left.get_title(loc="left") == "(a) IDNN"
+    assert left.get_title(loc="left") == f"(a) {title('idnn')}"
     assert r"1\,000" in right.get_title(loc="left")
     labels = [text.get_text() for text in right.get_legend().get_texts()]
-    assert labels[:2] == ["IDNN", "Rotne-Prager inverse"]
+    assert labels[:2] == [title("idnn"), title("rotne_prager")]
 
 
 def test_paths_in_space_keep_their_heights_and_cast_their_shadows_on_the_floor():
@@ -484,6 +486,19 @@ def test_tables_of_several_cases_are_refused_where_one_is_drawn():
     for name in ("predicted_vs_target", "force_scatter", "force_pdf"):
         with pytest.raises(ValueError, match=f"{name} has no rows of component"):
             getattr(figures, name)(TABLES[name]().query("component == 'streamwise'"))
+
+
+def test_no_two_force_models_look_alike_and_none_goes_by_its_name_in_code():
+    looks = {tuple(model_look(model).values()) for model in FORCE_MODELS}
+    assert len(looks) == len(FORCE_MODELS)
+    campaign = [*FORMULAS, *trained_models()]
+    assert len({model_look(model)["color"] for model in campaign}) == len(campaign)
+    names = set(FORCE_MODELS)
+    tables = {"predicted_vs_target", "error_by_distance", "learning_curve", "accuracy_vs_cost"}
+    for name in tables | {"inverse_beta"}:
+        figure = getattr(figures, name)(TABLES[name]())
+        texts = {text.get_text() for text in figure.findobj(mpl.text.Text)}
+        assert not texts & names, name
 
 
 def test_r2_and_slope_stand_in_the_panels():

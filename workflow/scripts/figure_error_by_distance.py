@@ -2,23 +2,17 @@
 
 from pathlib import Path
 
-import h5py
-
 import joblog
-from dustfall.analysis.evaluation import error_by_gap
+from dustfall.analysis.evaluation import error_by_gap, prediction_columns
+from dustfall.columns import read_columns
 from dustfall.figures.forces import error_by_distance
 from dustfall.figures.style import save
+from dustfall.forces.formulas import FORMULAS
+from dustfall.forces.registry import trained_models
 
 joblog.start(snakemake.log[0])
 
-names = {
-    "dense": "dense ANN",
-    "idnn": "IDNN",
-    "rotne_prager": "Rotne-Prager",
-    "reflections": "reflections",
-    "anchored": "anchored IDNN",
-}
-with h5py.File(snakemake.input.predictions) as file:
-    predictions = {title: file[name][()] for name, title in names.items()}
-    table = error_by_gap(predictions, file["target"][()], file["gap"][()])
+models = [*FORMULAS, *trained_models()]
+found = read_columns(snakemake.input.predictions, prediction_columns(models))
+table = error_by_gap({model: found[model] for model in models}, found["target"], found["gap"])
 save(error_by_distance(table), table, Path(snakemake.output.png).with_suffix(""))

@@ -1,20 +1,19 @@
-"""Draw predicted against target force of each learned model."""
+"""Draw predicted against target force of the paper's two networks and of the anchored one."""
 
 from pathlib import Path
 
-import h5py
-
 import joblog
 from dustfall.analysis.correlations import predictions_against_target
+from dustfall.analysis.evaluation import prediction_columns
+from dustfall.columns import read_columns
 from dustfall.figures.forces import predicted_vs_target
 from dustfall.figures.style import save
 
 joblog.start(snakemake.log[0])
 
-names = {"idnn": "IDNN", "dense": "dense ANN", "anchored": "anchored IDNN"}
-with h5py.File(snakemake.input.predictions) as file:
-    own = file["radial_law"][()].astype(str) == snakemake.params.radial_law
-    target = file["target"][()][own]
-    predictions = {title: file[name][()][own] for name, title in names.items()}
-table = predictions_against_target(target, predictions, snakemake.params.samples)
+models = ["idnn", "dense", "anchored"]
+found = read_columns(snakemake.input.predictions, prediction_columns(models))
+own = found["radial_law"] == snakemake.params.radial_law
+predictions = {model: found[model][own] for model in models}
+table = predictions_against_target(found["target"][own], predictions, snakemake.params.samples)
 save(predicted_vs_target(table), table, Path(snakemake.output.png).with_suffix(""))
