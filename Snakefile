@@ -25,7 +25,7 @@ except ConfigurationError as error:
     sys.exit(f"Configuration: {error}")
 
 # The library of this checkout is the one whose files the rules watch, so it is the one they run;
-# each job keeps to one thread, because jobs fill the cores and bits must not hang on their number.
+# each job keeps to one thread, because jobs fill the cores and bits must not depend on their number.
 os.environ.update(PYTHONPATH=str(ROOT), NUMBA_NUM_THREADS="1")
 
 

@@ -156,7 +156,7 @@ def test_damaged_data_are_refused(damage, sentence):
         check(data)
 
 
-def test_split_parts_all_scenes_and_hangs_on_the_seed():
+def test_split_parts_all_scenes_and_depends_on_the_seed():
     data = campaign()
     training, test = split(data, 0.2, seed=1)
     assert (len(training), len(test)) == (26, 7)

@@ -18,18 +18,18 @@ def export_onnx(model: LearnedModel, path) -> None:
     """Write the trained networks of `model` to `path`.
 
     The graph, in float64, maps what `features.describe` returns, `inputs` (m, k, F) and `envelope`
-    (m, uses), to `streamwise` (m, 1) and `lateral` (m, 2) [Re_p c_D]: what the networks add, in the
-    frame of the model, to its baseline. Frame and baseline are geometry and not in it. The model's
-    header is the metadata "header", as JSON. Needs the package onnx.
+    (m, block inputs), to `streamwise` (m, 1) and `lateral` (m, 2) [Re_p c_D]: what the networks
+    add, in the frame of the model, to its baseline. Frame and baseline are geometry and not in it.
+    The model's header is the metadata "header", as JSON. Needs the package onnx.
     """
     nodes, constants = [], []
     for component, network in model.networks.items():
         _add_network(nodes, constants, component, network)
-    features, uses = len(network.mean), len(network.uses)
+    features, given = len(network.mean), len(network.block_inputs)
     graph = helper.make_graph(
         nodes,
         f"dustfall {model.name}",
-        [_value("inputs", model.neighbours, features), _value("envelope", uses)],
+        [_value("inputs", model.neighbours, features), _value("envelope", given)],
         [_value(component, len(columns)) for component, columns in COMPONENTS.items()],
         constants,
     )
@@ -70,7 +70,7 @@ def _add_network(nodes, constants, component: str, network: Network) -> None:
         for number, block in enumerate(network.blocks)
     ]
     total = None
-    for row, (block, first, count) in enumerate(network.uses.tolist()):
+    for row, (block, first, count) in enumerate(network.block_inputs.tolist()):
         ends = constant(f"first.{row}", [first]), constant(f"last.{row}", [first + count])
         seen = node("Slice", normal, *ends, axis)
         width = count * len(network.mean)
@@ -80,7 +80,7 @@ def _add_network(nodes, constants, component: str, network: Network) -> None:
             if bias:
                 hidden = node("Add", hidden, bias[0])
                 hidden = node("Tanh" if ACTIVATION[component] == "tanh" else "Relu", hidden)
-        ends = constant(f"use.{row}", [row]), constant(f"next.{row}", [row + 1])
+        ends = constant(f"row.{row}", [row]), constant(f"next.{row}", [row + 1])
         weighted = node("Mul", hidden, node("Slice", "envelope", *ends, columns))
         total = weighted if total is None else node("Add", total, weighted)
     node("Mul", total, constant("unit", float(network.unit)), result=component)

@@ -25,12 +25,12 @@ FEWEST = {"dense": 1, "pairwise": 1, "decomposed": 3}
 """Fewest neighbours that give each block of a network something to see."""
 
 
-def block_uses(blocks: str, neighbours: int) -> np.ndarray:
-    """How the outputs of a network's blocks add up, (uses, 3).
+def block_inputs(blocks: str, neighbours: int) -> np.ndarray:
+    """What the blocks of a network are given, one row each time: (block inputs, 3).
 
-    Each row is one use: block, first neighbour, number of neighbours. blocks: "dense", one block
-    for all neighbours; "pairwise", one for each neighbour alone; "decomposed", one for the two
-    nearest and one for each other: F = F_12 + F_3 + F_4 + F_5 (paper, Fig. nnModel).
+    A row is block, first neighbour, number of neighbours; the outputs add up. blocks: "dense", one
+    block for all neighbours; "pairwise", one for each neighbour alone; "decomposed", one for the
+    two nearest and one for each other: F = F_12 + F_3 + F_4 + F_5 (paper, Fig. nnModel).
     Raises ValueError for too few neighbours.
     """
     if neighbours < FEWEST[blocks]:
@@ -48,9 +48,9 @@ def block_uses(blocks: str, neighbours: int) -> np.ndarray:
 class Kind:
     """A kind of learned model: which blocks, and which frame, inputs and baseline they stand on.
 
-    title: what figures and tables call it. blocks: as `block_uses` takes them. ordered: neighbours
-    sorted by distance, else taken as they are given. unit_vectors: inputs 1/r, log r and the unit
-    vector, else spherical coordinates. canonical: canonical frame of the symmetries, else the
+    title: what figures and tables call it. blocks: as `block_inputs` takes them. ordered:
+    neighbours sorted by distance, else as they are given. unit_vectors: inputs 1/r, log r and the
+    unit vector, else spherical coordinates. canonical: canonical frame of the symmetries, else the
     flow's. baseline: formula that the networks' output adds to. final: the campaign trains it on
     all that it may learn from; else it is one step of the ablation.
     """
@@ -101,7 +101,8 @@ block alone (Seyed-Ahmadi & Wachs 2022); its IDNN; then, one change at a time, t
 class Scenes:
     """Scenes as a network takes them.
 
-    inputs: (m, k, F), not yet normalised. envelope: (m, uses), weight of each use of a block.
+    inputs: (m, k, F), not yet normalised. envelope: (m, block inputs), weight of
+    the output for each.
     baseline: (m, 3), force in the flow frame that the network's output adds to. axes: (m, 2, 2),
     lateral axes of the frame of that output, where it is not the flow's.
     """
@@ -139,15 +140,15 @@ def describe(kind: str, neighbours: np.ndarray, radial_input: str, largest: floa
     natural logarithm. `largest` is the largest distance trained on: the networks see neighbours
     beyond it there. The outputs fade, so that a reference sphere whose neighbours all move away
     goes over into Stokes drag: with spherical coordinates as 1/distance of the nearest neighbour,
-    from `largest` on; with unit vectors each use as 1/distance of its (nearest) neighbour, on
-    the reflections, whose error falls sooner, as its fourth power.
+    from `largest` on; with unit vectors each block input as 1/distance of its (nearest) neighbour,
+    on the reflections, whose error falls sooner, as its fourth power.
     """
     layout = KINDS[kind]
     if layout.ordered:
         neighbours = sort_by_distance(neighbours)
     neighbours = hold_at_contact(neighbours)
     seen, axes = canonical_frame(neighbours) if layout.canonical else (neighbours, None)
-    first = block_uses(layout.blocks, neighbours.shape[1])[:, 1]
+    first = block_inputs(layout.blocks, neighbours.shape[1])[:, 1]
     if layout.unit_vectors:
         inputs = _unit_vectors(seen, largest)
         power = _FADING[layout.baseline]

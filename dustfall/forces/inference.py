@@ -15,13 +15,13 @@ _LARGEST = 18.0  # tanh of it is one to 5e-16
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
-def evaluate(inputs, envelope, mean, scale, parameters, widths, uses, bounded, outputs):
+def evaluate(inputs, envelope, mean, scale, parameters, widths, block_inputs, bounded, outputs):
     """Return the network's output (m, outputs) in units of its target's scale.
 
-    inputs (m, k, F) with their `mean` and `scale` (F,); envelope (m, uses); `parameters`, one
-    vector per block (rows of a matrix, padded): each layer's weights (out, in) and biases (out,);
-    `widths` (blocks, layers + 1), padded with zeros; `uses` (uses, 3), each row one use of a block:
-    block, first neighbour, number of neighbours. `bounded` tells tanh from ReLU.
+    inputs (m, k, F) with their `mean` and `scale` (F,); envelope (m, block inputs); `parameters`,
+    one vector per block (rows of a matrix, padded): each layer's weights (out, in) and biases
+    (out,); `widths` (blocks, layers + 1), padded with zeros; `block_inputs` as of
+    `features.block_inputs`. `bounded` tells tanh from ReLU.
     """
     count, _, features = inputs.shape
     result = np.zeros((count, outputs))
@@ -29,8 +29,8 @@ def evaluate(inputs, envelope, mean, scale, parameters, widths, uses, bounded, o
     layer = np.empty((largest, LANES))
     following = np.empty((largest, LANES))
     for start in range(0, count, LANES):
-        for use in range(uses.shape[0]):
-            block, first, number = uses[use]
+        for row in range(block_inputs.shape[0]):
+            block, first, number = block_inputs[row]
             for j in range(number):
                 for k in range(features):
                     for lane in range(LANES):
@@ -54,7 +54,7 @@ def evaluate(inputs, envelope, mean, scale, parameters, widths, uses, bounded, o
                 layer, following = following, layer
             for lane in range(min(LANES, count - start)):
                 for o in range(outputs):
-                    result[start + lane, o] += envelope[start + lane, use] * layer[o, lane]
+                    result[start + lane, o] += envelope[start + lane, row] * layer[o, lane]
     return result
 
 

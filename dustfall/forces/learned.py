@@ -12,7 +12,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save_file
 
 from dustfall.files import atomic
-from dustfall.forces.features import KINDS, RADIAL_INPUTS, block_uses, describe
+from dustfall.forces.features import KINDS, RADIAL_INPUTS, block_inputs, describe
 from dustfall.forces.frames import MOST_NEIGHBOURS, check_neighbours
 from dustfall.forces.inference import evaluate
 from dustfall.units import COMPONENTS, NEIGHBOURS
@@ -50,7 +50,7 @@ def parse_layers(layers: str, kind: str) -> list[list[int]]:
 def block_widths(kind: str, layers: str, component: str, neighbours: int) -> list[list[int]]:
     """Return each block's widths from its inputs over the hidden layers to its outputs."""
     layout = KINDS[kind]
-    seen = {block: number for block, _, number in block_uses(layout.blocks, neighbours).tolist()}
+    seen = {block: number for block, _, number in block_inputs(layout.blocks, neighbours).tolist()}
     return [
         [seen[block] * INPUTS[layout.unit_vectors], *hidden, len(COMPONENTS[component])]
         for block, hidden in enumerate(parse_layers(layers, kind))
@@ -62,7 +62,7 @@ def multiplications(kind: str, layers: str, component: str, neighbours: int = NE
     widths = block_widths(kind, layers, component, neighbours)
     return sum(
         wide * narrow
-        for block in block_uses(KINDS[kind].blocks, neighbours)[:, 0]
+        for block in block_inputs(KINDS[kind].blocks, neighbours)[:, 0]
         for wide, narrow in pairwise(widths[block])
     )
 
@@ -71,13 +71,13 @@ def multiplications(kind: str, layers: str, component: str, neighbours: int = NE
 class Network:
     """Trained weights of one component's network.
 
-    uses: how its blocks are used, see `block_uses`. blocks: per block, per layer, the weight
-    (out, in) and the bias (out,), the last layer without bias. mean and scale (F,) normalise the
-    inputs; `unit` is the size of the output in Re_p c_D.
+    block_inputs: what its blocks are given, see `features.block_inputs`. blocks: per block, per
+    layer, the weight (out, in) and the bias (out,), the last layer without bias. mean and scale
+    (F,) normalise the inputs; `unit` is the size of the output in Re_p c_D.
     """
 
     component: str
-    uses: np.ndarray
+    block_inputs: np.ndarray
     blocks: list[list[tuple[np.ndarray, ...]]]
     mean: np.ndarray
     scale: np.ndarray
@@ -89,7 +89,7 @@ class Network:
         return sum(array.size for block in self.blocks for layer in block for array in layer)
 
     def residual(self, inputs: np.ndarray, envelope: np.ndarray) -> np.ndarray:
-        """Return the output (m, 1 or 2) in Re_p c_D for inputs (m, k, F), envelope (m, uses)."""
+        """Output (m, 1 or 2) in Re_p c_D for inputs (m, k, F) and envelope (m, block inputs)."""
         parameters, widths = self._packed
         return self.unit * evaluate(
             inputs,
@@ -98,7 +98,7 @@ class Network:
             self.scale,
             parameters,
             widths,
-            self.uses,
+            self.block_inputs,
             ACTIVATION[self.component] == "tanh",
             len(COMPONENTS[self.component]),
         )
@@ -250,8 +250,8 @@ def _network(tensors, header, component):
     features = INPUTS[layout.unit_vectors]
     mean, scale = tensor("mean", features), tensor("scale", features)
     unit = float(tensor("unit", 1)[0])
-    uses = block_uses(layout.blocks, neighbours)
-    return Network(component, uses, blocks, mean, scale, unit)
+    given = block_inputs(layout.blocks, neighbours)
+    return Network(component, given, blocks, mean, scale, unit)
 
 
 def _checksum(header, tensors):

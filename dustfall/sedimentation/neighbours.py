@@ -1,6 +1,6 @@
 """The nearest neighbours of every particle in a periodic cube.
 
-What the search returns hangs on the positions alone: distances are those between nearest images,
+What the search returns depends on the positions alone: distances are those between nearest images,
 computed in one way everywhere, and where two are equal the particle with the lower row comes first.
 """
 

@@ -10,7 +10,7 @@ import torch
 from torch import nn
 
 from dustfall import __version__
-from dustfall.forces.features import KINDS, RADIAL_INPUTS, Scenes, block_uses, describe
+from dustfall.forces.features import KINDS, RADIAL_INPUTS, Scenes, block_inputs, describe
 from dustfall.forces.frames import check_neighbours
 from dustfall.forces.learned import FORMAT, VERSION, LearnedModel, Network, parse_layers
 from dustfall.streams import Purpose, sequence, stream
@@ -102,8 +102,8 @@ def fit(
 ) -> list[History]:
     """Train k networks side by side, in place, and leave each at its best validation error.
 
-    `tensors` are the normalised inputs (k, m, neighbours, F), envelope (k, m, uses) and target
-    (k, m, 1 or 2); `splits` are each network's training and validation rows, `generators` shuffle
+    `tensors` are the normalised inputs (k, m, neighbours, F), envelope (k, m, block inputs) and
+    target (k, m, 1 or 2); `splits` are each network's training and validation rows, `generators` shuffle
     them. In an epoch all take as many steps as the smallest training set gives. `report(epoch)` is
     called after each epoch. Returns the histories, in the target's unit. Raises FloatingPointError
     when no validation error of a network was finite.
@@ -292,8 +292,8 @@ def train_networks(
             for block in networks.blocks
         ]
         errors = [error * unit**2 for error in history.validation_error]
-        uses = block_uses(KINDS[kind].blocks, neighbours)
-        network = Network(component, uses, blocks, mean, scale, unit)
+        given = block_inputs(KINDS[kind].blocks, neighbours)
+        network = Network(component, given, blocks, mean, scale, unit)
         trained.append((network, History(history.epochs, errors)))
     return trained
 
@@ -348,7 +348,7 @@ def data_hash(neighbours: np.ndarray, force: np.ndarray) -> str:
 
 @contextmanager
 def one_thread():
-    """Run PyTorch on one thread: bits then do not hang on the machine's load or core count."""
+    """Run PyTorch on one thread: bits then do not depend on the machine's load or core count."""
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import nn
 
-from dustfall.forces.features import KINDS, block_uses
+from dustfall.forces.features import KINDS, block_inputs
 from dustfall.forces.learned import ACTIVATION, block_widths
 
 
@@ -52,27 +52,27 @@ class Block(nn.Sequential):
 
 
 class BlockSum(nn.Module):
-    """Sum of the blocks' outputs over their uses (see `features.block_uses`), each weighted."""
+    """Sum of the blocks' outputs for what they are given (`features.block_inputs`), weighted."""
 
-    def __init__(self, blocks: list[Block], uses):
+    def __init__(self, blocks: list[Block], given: np.ndarray):
         super().__init__()
         self.blocks = nn.ModuleList(blocks)
-        # The uses of a block follow each other, so that what they see is one piece.
+        # The inputs of a block follow each other, so that what they see is one piece.
         self.pieces = []
         for number in range(len(blocks)):
-            rows = np.flatnonzero(uses[:, 0] == number)
-            first, end = uses[rows[0], 1], uses[rows[-1], 1:].sum()
+            rows = np.flatnonzero(given[:, 0] == number)
+            first, end = given[rows[0], 1], given[rows[-1], 1:].sum()
             self.pieces.append((slice(rows[0], rows[-1] + 1), slice(first, end)))
 
     def forward(self, inputs: torch.Tensor, envelope: torch.Tensor) -> torch.Tensor:
-        """Map inputs (k, b, neighbours, F), normalised, and envelope (k, b, uses) to outputs."""
+        """Map normalised inputs (k, b, neighbours, F) and envelope (k, b, block inputs)."""
         k, b = inputs.shape[:2]
         total = 0.0
         for (rows, neighbours), block in zip(self.pieces, self.blocks, strict=True):
             weights = envelope[:, :, rows, None]
-            uses = weights.shape[2]
-            seen = inputs[:, :, neighbours].reshape(k, b * uses, -1)
-            total = total + (block(seen).view(k, b, uses, -1) * weights).sum(2)
+            times = weights.shape[2]
+            seen = inputs[:, :, neighbours].reshape(k, b * times, -1)
+            total = total + (block(seen).view(k, b, times, -1) * weights).sum(2)
         return total
 
 
@@ -84,4 +84,4 @@ def build(
         Block(widths, ACTIVATION[component], generators)
         for widths in block_widths(kind, layers, component, neighbours)
     ]
-    return BlockSum(blocks, block_uses(KINDS[kind].blocks, neighbours))
+    return BlockSum(blocks, block_inputs(KINDS[kind].blocks, neighbours))

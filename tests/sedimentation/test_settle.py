@@ -350,7 +350,7 @@ def interrupt_at(step):
 
 
 class MindfulOfOrder:
-    """A model whose forces hang on the place of a scene among those that it is shown."""
+    """A model whose forces depend on the place of a scene among those that it is shown."""
 
     def predict(self, neighbours):
         force = ROTNE_PRAGER.predict(neighbours)

@@ -51,7 +51,7 @@ def test_the_number_of_a_particle_does_not_matter(tmp_path):
 
 
 def test_eight_copies_of_a_cube_move_as_one(tmp_path):
-    # The motion hangs on n through the random start alone: the periodic cloud is the same.
+    # The motion depends on n through the random start alone: the periodic cloud is the same.
     copies = SIDE * np.stack(np.meshgrid(*3 * [[0, 1]]), -1).reshape(-1, 1, 3)
     here = coordinates(tmp_path, ROTNE_PRAGER, POSITIONS, VELOCITIES)
     there = coordinates(

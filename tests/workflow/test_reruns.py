@@ -67,7 +67,7 @@ def changed_themselves(words: str) -> set[str]:
     ("setting", "expected"),
     [
         ("scenes={phi_max: 5.0e-4}", SHARDS | FROM_DATA),
-        # A fourth shard, and all that hangs on the data set.
+        # A fourth shard, and all that depends on the data set.
         (
             "scenes={number: {uniform: 150}}",
             {"scenes": 1, "stokes": 1} | FROM_DATA,
@@ -116,7 +116,7 @@ def changed_themselves(words: str) -> set[str]:
         ("figures={frozen_cloud: {clouds: 3}}", {"figure_frozen_cloud": 1}),
     ],
 )
-def test_an_edited_key_reruns_what_hangs_on_it_and_nothing_else(rehearsal, setting, expected):
+def test_an_edited_key_reruns_what_depends_on_it_and_nothing_else(rehearsal, setting, expected):
     words = rehearsal.dry_run(*SMOKE, "--config", setting, "--", "all")
     jobs = jobs_of(words)
     assert jobs.pop("configuration") == 1

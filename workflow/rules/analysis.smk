@@ -48,7 +48,7 @@ rule steady_state:
 
 
 rule independence_of_n:
-    """Test whether the averages hang on the number of particles."""
+    """Test whether the averages depend on the number of particles."""
     input:
         steady="results/analysis/steady_state.csv",
         library=library("independence_of_n.py"),

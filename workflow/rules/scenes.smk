@@ -1,5 +1,5 @@
 rule scenes:
-    """Draw the scenes of a shard; each hangs on the seed and its own number alone."""
+    """Draw the scenes of a shard; each depends on the seed and its own number alone."""
     input:
         library=library("scenes.py"),
     output:

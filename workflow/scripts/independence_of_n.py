@@ -1,4 +1,4 @@
-"""Test whether the steady-state averages hang on the number of particles."""
+"""Test whether the steady-state averages depend on the number of particles."""
 
 import pandas as pd
 
