@@ -218,11 +218,11 @@ def voronoi_pdf_table(cells: Iterable[xr.Dataset], start: float, seed: int) -> p
     """Tabulate the p.d.f. of normalised Voronoï volumes for each Galileo number.
 
     Parameters: `cells` as `cell_volumes` returns them, of one volume fraction, one or, with several
-    seeds, more for each Galileo number; `start` of the steady state [tau]; `seed` of the bootstrap.
+    seeds, more for each Galileo number; `start` of the averaging window [tau]; `seed`.
 
-    Returns the columns source, galileo_multiple, volume, density, low, high. Sources: "steady
-    state" (one curve a Galileo number, as a multiple of the lowest), "random start" (first frames
-    at the lowest), "gamma, k = 5, theta = 0.2" and "gamma, k = 5.59".
+    Returns the columns source, galileo_multiple, volume, density, low, high. Sources: "settling"
+    (from `start` on, one curve a Galileo number, as a multiple of the lowest), "random start"
+    (first frames at the lowest), "gamma, k = 5, theta = 0.2" and "gamma, k = 5.59".
 
     Raises ValueError where there are no cells, no frame after `start` or an attribute missing.
     """
@@ -235,7 +235,7 @@ def voronoi_pdf_table(cells: Iterable[xr.Dataset], start: float, seed: int) -> p
         volumes = pooled_volumes(runs, start)
         tables.append(
             volume_distribution(volumes, seed).assign(
-                source="steady state", galileo_multiple=round(galileo / lowest, 6)
+                source="settling", galileo_multiple=round(galileo / lowest, 6)
             )
         )
     x = np.linspace(0, VOLUME_EDGES[-1], 401)[1:]

@@ -139,7 +139,7 @@ def test_pdf_table_names_galileo_numbers_as_multiples_of_the_lowest():
     table = voronoi_pdf_table([cells(galileo=0.312), cells(galileo=0.078)], 50.0, seed=1)
     assert table["source"].unique().tolist() == [
         "random start",
-        "steady state",
+        "settling",
         "gamma, k = 5, theta = 0.2",
         "gamma, k = 5.59",
     ]
