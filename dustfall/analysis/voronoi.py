@@ -136,11 +136,6 @@ def random_sphere_table(
     return pd.DataFrame(rows)
 
 
-def gamma_pdf(volume, shape, scale) -> np.ndarray:
-    """Density of the gamma law with shape k and scale theta; its variance is k theta^2."""
-    return stats.gamma.pdf(volume, shape, scale=scale)
-
-
 def block_bootstrap(values, seed, length=1.0, confidence=0.95) -> tuple[np.ndarray, np.ndarray]:
     """Confidence interval of the mean over the first axis of correlated samples (k, ...).
 
@@ -239,11 +234,11 @@ def voronoi_pdf_table(cells: Iterable[xr.Dataset], start: float, seed: int) -> p
             )
         )
     x = np.linspace(0, VOLUME_EDGES[-1], 401)[1:]
-    for name, law in {
+    for name, (shape, scale) in {
         "gamma, k = 5, theta = 0.2": PAPER_GAMMA,
         "gamma, k = 5.59": MATCHED_GAMMA,
     }.items():
-        density = gamma_pdf(x, *law)
+        density = stats.gamma.pdf(x, shape, scale=scale)
         tables.append(pd.DataFrame({"source": name, "volume": x, "density": density}))
     table = pd.concat(tables, ignore_index=True)
     return table[["source", "galileo_multiple", "volume", "density", "low", "high"]]
