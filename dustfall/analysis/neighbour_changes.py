@@ -1,4 +1,4 @@
-"""How often the five nearest neighbours change."""
+"""How often the nearest neighbours change."""
 
 from collections.abc import Iterable
 
@@ -6,47 +6,47 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from dustfall.analysis.settling import CASE, case_of, from_time
-from dustfall.analysis.time_averages import mean_with_interval
+from dustfall.analysis.settling import CASE, case_of, from_time, steadiness
+from dustfall.analysis.time_averages import mean_of_runs, mean_with_interval
 
 
 def neighbour_changes(runs: Iterable[xr.Dataset], start: float) -> pd.DataFrame:
     """Tabulate the share of particles that get a new neighbour in a step, from `start` [tau] on.
 
     Parameters: `runs`, series datasets with new_neighbours (step), the share of particles whose set
-    of five is another than a step ago, and only_farthest (step), the share of these in which only
-    the farthest changed; attribute step [tau].
+    of neighbours is another than a step ago, only_farthest (step), the share of these in which only
+    the farthest changed, and mean and variance of the settling velocity; attributes step [tau] and
+    those of `settling.steady_state`.
 
-    Returns the columns model, n, volume_fraction, galileo, step, share, low, high (95 % interval,
-    batch means), per_tau = share / step, and only_farthest, the share of all changes; sorted. Runs
-    of one case are averaged, with the mean of their intervals' half-widths over the root of their
-    number.
+    Returns the columns model, n, volume_fraction, galileo, step, status (`settling.steadiness`: in
+    a case that is not steady the share still changes), share, low, high (95 % interval of
+    `time_averages.mean_of_runs`), per_tau = share / step, and only_farthest, the share of all
+    changes; sorted.
+
+    Raises ValueError where there is no run or nothing is left after `start`.
     """
-    rows = []
+    cases: dict[tuple, list[xr.Dataset]] = {}
     for run in runs:
-        part = from_time(run, start, "step")
-        mean = mean_with_interval(part["new_neighbours"].values)
-        changes = part["new_neighbours"].values
-        fifth = np.nan_to_num(part["only_farthest"].values)
-        only = np.sum(changes * fifth) / np.sum(changes) if changes.any() else np.nan
+        key = (*case_of(run).values(), float(run.attrs["step"]))
+        cases.setdefault(key, []).append(from_time(run, start, "step"))
+    if not cases:
+        raise ValueError("there are no runs: at least one series is needed")
+    rows = []
+    for (*case, step), windows in sorted(cases.items()):
+        mean = mean_of_runs([mean_with_interval(w["new_neighbours"].values) for w in windows])
+        changes = np.concatenate([w["new_neighbours"].values for w in windows])
+        # A step without changes has no share of its own.
+        farthest = np.nan_to_num(np.concatenate([w["only_farthest"].values for w in windows]))
         rows.append(
-            case_of(run)
+            dict(zip(CASE, case, strict=True))
             | {
-                "step": float(run.attrs["step"]),
+                "step": step,
+                "status": steadiness(windows)[0],
                 "share": mean.value,
-                "half_width": mean.half_width,
-                "only_farthest": only,
+                "low": mean.value - mean.half_width,
+                "high": mean.value + mean.half_width,
+                "per_tau": mean.value / step,
+                "only_farthest": np.average(farthest, weights=changes) if changes.any() else np.nan,
             }
         )
-    if not rows:
-        raise ValueError("there are no runs: at least one series is needed")
-    cases = pd.DataFrame(rows).groupby([*CASE, "step"])
-    table = cases.agg(
-        share=("share", "mean"),
-        half_width=("half_width", lambda h: h.mean() / np.sqrt(len(h))),
-        only_farthest=("only_farthest", "mean"),
-    ).reset_index()
-    table["low"] = table["share"] - table["half_width"]
-    table["high"] = table["share"] + table["half_width"]
-    table["per_tau"] = table["share"] / table["step"]
-    return table[[*CASE, "step", "share", "low", "high", "per_tau", "only_farthest"]]
+    return pd.DataFrame(rows)

@@ -1,4 +1,4 @@
-"""Settling velocity of the cloud: time series, steady state with interval, tracked particles."""
+"""Settling velocity of the cloud: time series, what is steady of it, tracked particles."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -68,7 +68,7 @@ def even_interval(time) -> float:
     """Interval of evenly spaced times (m,); ValueError where they are uneven or fewer than four."""
     time = np.asarray(time, dtype=float)
     if len(time) < 4:
-        raise ValueError(f"{len(time)} samples lie in the steady state; at least 4 are needed")
+        raise ValueError(f"{len(time)} samples lie in the averaging window; at least 4 are needed")
     interval = (time[-1] - time[0]) / (len(time) - 1)
     if not np.allclose(np.diff(time), interval, rtol=1e-3):
         raise ValueError("the samples are unevenly spaced in time")

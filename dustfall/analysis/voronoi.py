@@ -136,11 +136,6 @@ def random_sphere_table(
     return pd.DataFrame(rows)
 
 
-def gamma_pdf(volume, shape, scale) -> np.ndarray:
-    """Density of the gamma law with shape k and scale theta; its variance is k theta^2."""
-    return stats.gamma.pdf(volume, shape, scale=scale)
-
-
 def block_bootstrap(values, seed, length=1.0, confidence=0.95) -> tuple[np.ndarray, np.ndarray]:
     """Confidence interval of the mean over the first axis of correlated samples (k, ...).
 
@@ -218,11 +213,11 @@ def voronoi_pdf_table(cells: Iterable[xr.Dataset], start: float, seed: int) -> p
     """Tabulate the p.d.f. of normalised Voronoï volumes for each Galileo number.
 
     Parameters: `cells` as `cell_volumes` returns them, of one volume fraction, one or, with several
-    seeds, more for each Galileo number; `start` of the steady state [tau]; `seed` of the bootstrap.
+    seeds, more for each Galileo number; `start` of the averaging window [tau]; `seed`.
 
-    Returns the columns source, galileo_multiple, volume, density, low, high. Sources: "steady
-    state" (one curve a Galileo number, as a multiple of the lowest), "random start" (first frames
-    at the lowest), "gamma, k = 5, theta = 0.2" and "gamma, k = 5.59".
+    Returns the columns source, galileo_multiple, volume, density, low, high. Sources: "settling"
+    (from `start` on, one curve a Galileo number, as a multiple of the lowest), "random start"
+    (first frames at the lowest), "gamma, k = 5, theta = 0.2" and "gamma, k = 5.59".
 
     Raises ValueError where there are no cells, no frame after `start` or an attribute missing.
     """
@@ -235,15 +230,15 @@ def voronoi_pdf_table(cells: Iterable[xr.Dataset], start: float, seed: int) -> p
         volumes = pooled_volumes(runs, start)
         tables.append(
             volume_distribution(volumes, seed).assign(
-                source="steady state", galileo_multiple=round(galileo / lowest, 6)
+                source="settling", galileo_multiple=round(galileo / lowest, 6)
             )
         )
     x = np.linspace(0, VOLUME_EDGES[-1], 401)[1:]
-    for name, law in {
+    for name, (shape, scale) in {
         "gamma, k = 5, theta = 0.2": PAPER_GAMMA,
         "gamma, k = 5.59": MATCHED_GAMMA,
     }.items():
-        density = gamma_pdf(x, *law)
+        density = stats.gamma.pdf(x, shape, scale=scale)
         tables.append(pd.DataFrame({"source": name, "volume": x, "density": density}))
     table = pd.concat(tables, ignore_index=True)
     return table[["source", "galileo_multiple", "volume", "density", "low", "high"]]

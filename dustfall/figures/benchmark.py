@@ -10,6 +10,7 @@ from dustfall.figures.style import (
     MARKERS,
     REFERENCE,
     letter,
+    log_scale,
     new_figure,
     require,
     styled,
@@ -47,8 +48,7 @@ def solver_benchmark(frame: pd.DataFrame) -> Figure:
             panel.plot(points["milliseconds"], points["error_95"], lw=0.8, label=method, **look)
         best = own[front(own["milliseconds"], own["error_95"])].sort_values("milliseconds")
         panel.plot(best["milliseconds"], best["error_95"], color=REFERENCE, ls=":", zorder=0)
-        panel.set_xscale("log")
-        panel.set_yscale("log")
+        log_scale(panel, "xy")
         panel.set_title(name, loc="right")
     for panel in panels[len(sets) :]:
         panel.set_visible(False)

@@ -7,6 +7,7 @@ from dustfall.figures.style import (
     DOUBLE,
     REFERENCE,
     SINGLE,
+    log_scale,
     new_figure,
     phi_colour,
     phi_label,
@@ -43,8 +44,7 @@ def cloud_spectra(frame: pd.DataFrame) -> Figure:
             label = f"{phi_label(phi)}: ${slope:.2f}\\,({low:.2f},\\,{high:.2f})$"
             ax.plot(spectrum["x"], spectrum["y"], color=phi_colour(phi), label=label)
             ax.plot(fit["x"], fit["y"], color="k", lw=0.6, ls="--", zorder=5)
-        ax.set_xscale("log")
-        ax.set_yscale("log")
+        log_scale(ax, "xy")
         ax.set_title(METHOD_NAMES[method])
         ax.set_xlabel(r"wavenumber $\kappa\;[1/d_p]$")
         ax.legend(
@@ -83,7 +83,7 @@ def ergodicity(frame: pd.DataFrame) -> Figure:
             0.03, level + shift, meaning, va=place, fontsize=8, transform=ax.get_yaxis_transform()
         )
     ax.set_ylim(-0.1, 1.1)
-    ax.set_xscale("log")
+    log_scale(ax, "x")
     ax.set_xlabel(r"length $T/\tau$ of the time average")
     ax.set_ylabel(r"$\mathrm{var}^p(\overline{v_s}^{\,T}) \;/\; \mathrm{var}^p(v_s)$")
     phi_legend(figure, frame["volume_fraction"])

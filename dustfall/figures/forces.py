@@ -11,6 +11,7 @@ from dustfall.figures.style import (
     DOUBLE,
     SINGLE,
     letter,
+    log_scale,
     model_look,
     model_title,
     new_figure,
@@ -50,7 +51,7 @@ def force_scatter(frame: pd.DataFrame) -> Figure:
         ax.scatter(
             rows["volume_fraction"], rows["force"], s=4, color=colour, alpha=0.55, linewidths=0
         )
-        ax.set_xscale("log")
+        log_scale(ax, "x")
         ax.set_xlabel(r"volume fraction $\varphi$")
         ax.set_ylabel(f"{component} force $F_{symbols[component]}$ {FORCE_UNIT}")
         if component == "streamwise":
@@ -118,8 +119,8 @@ def force_pdf(frame: pd.DataFrame) -> Figure:
                 curve = rows[rows["component"] == components[0]]
                 y = level + scale * curve["laplace_density"]
                 ax.plot(curve["force"], y, color="k", ls=":", lw=0.9, zorder=order)
-                distance, level = curve[["laplace_ks", "laplace_ks_level"]].iloc[0]
-                note += f"\nKS {distance:.2g} ({level:.2g})"
+                found, expected = curve[["laplace_ks", "laplace_ks_level"]].iloc[0]
+                note += f"\nKS {found:.2g} ({expected:.2g})"
             ax.annotate(
                 note,
                 (0.015, level),
@@ -270,8 +271,7 @@ def error_by_distance(frame: pd.DataFrame) -> Figure:
         colour = model_look(model)["color"]
         ax.plot(rows["gap"], rows["rms_error"], color=colour, label=model_title(model))
         ax.plot(rows["gap"], rows["largest_error"], ".", color=colour, ms=3)
-    ax.set_xscale("log")
-    ax.set_yscale("log")
+    log_scale(ax, "xy")
     ax.set_xlabel("gap to the nearest neighbour [$d_p$]")
     ax.set_ylabel(f"error of the force {FORCE_UNIT}")
     ax.legend(title="line: RMS, dots: largest")
@@ -306,8 +306,7 @@ def learning_curve(frame: pd.DataFrame) -> Figure:
                 ms=3,
                 **looks[model],
             )
-        ax.set_xscale("log")
-        ax.set_yscale("log")
+        log_scale(ax, "xy")
         ax.set_xlabel("training scenes")
         ax.set_ylabel(f"$1 - R^2$, {component}")
     handles = [Line2D([], [], ms=3, label=model_title(m), **looks[m]) for m in models]
@@ -333,8 +332,7 @@ def accuracy_vs_cost(frame: pd.DataFrame) -> Figure:
         for model, rows in models:
             look = {"ls": "none", "label": model_title(model)} | model_look(model)
             ax.plot(rows["microseconds"], 1 - rows["r2"], **look)
-        ax.set_xscale("log")
-        ax.set_yscale("log")
+        log_scale(ax, "xy")
         ax.margins(0.1)
         ax.set_xlabel(r"processor time [$\mu$s a particle]")
         ax.set_ylabel(f"$1 - R^2$, {component}")
@@ -346,4 +344,5 @@ def accuracy_vs_cost(frame: pd.DataFrame) -> Figure:
 def determination(r2: float) -> str:
     """R^2 with as many digits as tell it from one."""
     digits = 3 if r2 >= 1 or r2 < 0.99 else int(np.ceil(-np.log10(1 - r2))) + 1
-    return f"$R^2 = {r2:.{min(digits, 7)}f}$"
+    # Minus zero is zero.
+    return f"$R^2 = {round(r2, min(digits, 7)) + 0.0:.{min(digits, 7)}f}$"

@@ -8,6 +8,7 @@ from dustfall.figures.style import (
     DOUBLE,
     REFERENCE,
     letter,
+    log_scale,
     new_figure,
     phi_colour,
     phi_label,
@@ -49,7 +50,7 @@ def _against_number(ax, frame):
         ax.fill_between(rows["x"], rows["low"], rows["high"], color=colour, alpha=0.3, lw=0)
         ax.plot(rows["x"], rows["y"], color=colour, marker="o", ms=2.5)
     ax.axvline(CLOSURE, color=REFERENCE, lw=0.6, ls="--", zorder=0)
-    ax.set_xscale("log")
+    log_scale(ax, "x")
     ax.set_ylim(0, 1.04)
     ax.set_xlabel("neighbours in unbounded fluid")
     ax.set_ylabel(r"mean drag $\overline{\beta}$")
@@ -86,6 +87,6 @@ def _against_phi(ax, frame, drag=False):
             capsize=2,
             label=f"{quantity}, {source}",
         )
-    ax.set_xscale("log")
+    log_scale(ax, "x")
     ax.set_xlabel(r"volume fraction $\varphi$")
     ax.set_ylabel("mean, over that of a lone sphere")

@@ -12,6 +12,7 @@ from dustfall.figures.style import (
     MARKERS,
     REFERENCE,
     letter,
+    log_scale,
     new_figure,
     require,
     styled,
@@ -46,12 +47,11 @@ def mesh_study(frame: pd.DataFrame) -> Figure:
         shown = rows[rows["error"] > 0]
         right.plot(shown["nodes"], shown["error"], label=label, **look)
     exact = left.axhline(STOKES_DRAG, color="k", lw=0.8, ls="--", zorder=0, label="exact, 24")
-    left.set_xscale("log")
+    log_scale(left, "x")
     left.set_xlabel("number of nodes")
     left.set_ylabel(r"force on an isolated sphere [$\mathrm{Re}_p c_D$]")
     left.set_ylim(frame["force"].min() - 1, max(frame["force"].max(), STOKES_DRAG) + 1.2)
-    right.set_xscale("log")
-    right.set_yscale("log")
+    log_scale(right, "xy")
     right.set_xlabel("number of nodes")
     right.set_ylabel(r"relative error $|F/24 - 1|$")
     left.yaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))

@@ -22,6 +22,14 @@ COLOURS = 128
 SLAB = 0.06
 """Share of the cube, in depth, that is drawn: of the whole cloud one would see its front alone."""
 
+PANEL = 0.75
+"""Share of a picture's width that the panel takes, beside the colour bar."""
+
+POINTS_PER_INCH = 72
+
+EXTREMES = (0.01, 0.99)
+"""Quantiles of the last frame's velocities between which the colour scale runs."""
+
 SMALLEST = 2.2
 """Diameter of a dot at least [point]; true to scale where particles are larger."""
 
@@ -33,7 +41,7 @@ def save_movie(
     milliseconds=120,
     progress: Callable[[int, int], None] | None = None,
 ) -> None:
-    """Write a GIF of a slab of the cloud, seen from the side, in the frame of its mean motion.
+    """Write a GIF of a slab of the cloud, seen from a side, in the frame of its mean motion.
 
     Parameters
     ----------
@@ -53,7 +61,7 @@ def save_movie(
     chosen = np.unique(np.linspace(0, total - 1, min(frames, total)).round().astype(int))
     last = trajectory.isel(frame=-1)
     speed = -last["velocities"][:, 2].values
-    limits = np.quantile(speed, [0.01, 0.99])
+    limits = np.quantile(speed, EXTREMES)
     pictures = []
     for done, k in enumerate(chosen, start=1):
         pictures.append(_picture(cloud_slice(trajectory.isel(frame=k)), limits, trajectory.attrs))
@@ -77,18 +85,18 @@ def cloud_slice(frame: xr.Dataset):
     """Side view of a slab of one frame: a table of x and z [d_p], velocity [v_s], and their frame.
 
     Positions are relative to the mean position and folded into the cube, so that the fall of the
-    whole cloud is taken out. Returns a pandas DataFrame with the side and time as attributes.
+    whole cloud is taken out. Returns a pandas DataFrame with box_length and time as attributes.
     """
-    side = float(frame["cell_lengths"][0])
+    length = float(frame["cell_lengths"][0])
     position = frame["coordinates"].values.astype(float)
     position = position - position.mean(axis=0)
-    position -= side * np.floor(position / side)
-    shown = position[:, 1] < SLAB * side
+    position -= length * np.floor(position / length)
+    shown = position[:, 1] < SLAB * length
     table = frame["velocities"][shown].to_pandas()
     table = table.set_axis(["x", "y", "velocity"], axis=1).drop(columns="y")
     table["velocity"] *= -1
     table["x"], table["z"] = position[shown, 0], position[shown, 2]
-    table.attrs = {"side": side, "time": float(frame["time"])}
+    table.attrs = {"box_length": length, "time": float(frame["time"])}
     return table
 
 
@@ -96,14 +104,14 @@ def cloud_slice(frame: xr.Dataset):
 def cloud_picture(frame, limits, volume_fraction: float, particles: int) -> Figure:
     """One picture of the movie.
 
-    `frame`: x, z, velocity and the attributes side and time, as `cloud_slice` gives; `limits` of
-    the colour scale [v_s]. Raises ValueError for a missing column.
+    `frame`: x, z, velocity and the attributes box_length and time, as `cloud_slice` gives; `limits`
+    of the colour scale [v_s]. Raises ValueError for a missing column.
     """
     require(frame, ["x", "z", "velocity"], "cloud_picture")
-    side = frame.attrs["side"]
+    length = frame.attrs["box_length"]
     figure = new_figure(*SIZE)
     ax = figure.subplots()
-    diameter = max(SMALLEST, 72 * 0.75 * SIZE[0] / side)
+    diameter = max(SMALLEST, POINTS_PER_INCH * PANEL * SIZE[0] / length)
     dots = ax.scatter(
         frame["x"],
         frame["z"],
@@ -114,8 +122,8 @@ def cloud_picture(frame, limits, volume_fraction: float, particles: int) -> Figu
         vmin=limits[0],
         vmax=limits[1],
     )
-    ax.set_xlim(0, side)
-    ax.set_ylim(0, side)
+    ax.set_xlim(0, length)
+    ax.set_ylim(0, length)
     ax.set_aspect("equal")
     ax.set_xlabel("$x$ [$d_p$]")
     ax.set_ylabel("$z$ [$d_p$], moving with the cloud")

@@ -14,6 +14,7 @@ from dustfall.figures.style import (
     REFERENCE,
     SINGLE,
     letter,
+    log_scale,
     mark_bounds,
     model_look,
     model_title,
@@ -28,6 +29,9 @@ from dustfall.figures.style import (
 
 PARTICLE_COLOURS = ("#d55e00", "#009e73", "#0072b2")
 """The paper's red, green and blue, in the set that the colour-blind can tell apart."""
+
+SIDE_VIEW = 3.6
+"""Height over width of a side view of paths."""
 
 OBLIQUE = (0.45, 0.035)
 """How far depth is drawn to the right, in sides of the box, and up, in its height."""
@@ -80,7 +84,7 @@ def inverse_beta(frame: pd.DataFrame) -> Figure:
     _batchelor(right, frame)
     _ash(right, frame)
     for ax in (left, right):
-        ax.set_xscale("log")
+        log_scale(ax, "x")
         ax.set_xlabel(r"volume fraction $\varphi$")
         handles, labels = ax.get_legend_handles_labels()
         ours = [isinstance(handle, ErrorbarContainer) for handle in handles]
@@ -221,7 +225,7 @@ def settling_in_time(frame: pd.DataFrame) -> Figure:
         mean.axhline(1, color=REFERENCE, lw=0.6, zorder=0)
         drift.axhline(0, color=REFERENCE, lw=0.6, zorder=0)
         mean.set_title(number_label(n))
-        variance.set_yscale("log")
+        log_scale(variance, "y")
         variance.set_xlabel(r"time $t/\tau$")
     positive = frame["variance"][frame["variance"] > 0]
     if not positive.empty:
@@ -301,19 +305,19 @@ def _spectra(ax, frame):
             f"${densest['slope']:.2f} \\pm {densest['slope_error']:.2f}$"
         )
         ax.text(0.04, 0.06, note, transform=ax.transAxes, fontsize=7.5)
-    ax.set_xscale("log")
-    ax.set_yscale("log")
+    log_scale(ax, "xy")
     ax.set_xlabel(r"wavenumber $\kappa\;[1/d_p]$")
 
 
 @styled
 def trajectories(frame: pd.DataFrame) -> Figure:
-    """Paths of the tracked particles from their starts: side view above, top view below.
+    """Paths of the tracked particles from their starts: top view above, side view below.
 
     `frame`: volume_fraction, n, particle, dx, dy, dz, as `analysis.settling.tracked_trajectories`
-    gives for one n; one column of panels a volume fraction. The side views share one scale, so
-    that the paths' growing unrest shows; each top view has its own. Raises ValueError for a
-    missing column, several n or fewer than two rows.
+    gives for one n; one column of panels a volume fraction. Top views have true aspect, each its
+    own scale. The side views share one scale, so that the paths' growing unrest shows; they are
+    stretched sideways by the factor that stands beside them. Raises ValueError for a missing
+    column, several n or fewer than two rows.
     """
     columns = ["volume_fraction", "n", "particle", "dx", "dy", "dz"]
     require(frame, columns, "trajectories", fewest=2)
@@ -321,32 +325,35 @@ def trajectories(frame: pd.DataFrame) -> Figure:
         raise ValueError(f"trajectories draws one n, not {frame['n'].unique().tolist()}")
     phis = sorted(frame["volume_fraction"].unique())
     figure = new_figure(DOUBLE if len(phis) > 2 else SINGLE, 5.2)
-    axes = figure.subplots(2, len(phis), squeeze=False, height_ratios=[3, 1])
-    side = 1.1 * frame["dx"].abs().max() or 1.0
+    axes = figure.subplots(2, len(phis), squeeze=False, height_ratios=[1, 3])
+    reach = 1.1 * frame["dx"].abs().max() or 1.0
+    low, high = 1.03 * frame["dz"].min(), max(0.0, frame["dz"].max())
     for column, phi in enumerate(phis):
-        above, below = axes[:, column]
+        top, side = axes[:, column]
         rows = frame[frame["volume_fraction"] == phi]
         for i, (_, path) in enumerate(rows.groupby("particle")):
             colour = PARTICLE_COLOURS[i % len(PARTICLE_COLOURS)]
-            above.plot(path["dx"], path["dz"], color=colour, lw=1)
-            below.plot(path["dx"], path["dy"], color=colour, lw=0.9)
-            below.plot(path["dx"].iloc[-1:], path["dy"].iloc[-1:], color=colour, marker="o", ms=2.5)
-        below.plot(0, 0, color="k", marker="+", ms=5, mew=0.8)
-        above.set_title(f"$\\varphi = ${phi_label(phi)}")
-        above.set_xlim(-side, side)
-        above.set_ylim(1.03 * frame["dz"].min(), max(0.0, frame["dz"].max()))
-        reach = 1.15 * rows[["dx", "dy"]].abs().to_numpy().max() or 1.0
-        below.set_xlim(-reach, reach)
-        below.set_ylim(-reach, reach)
-        below.set_aspect("equal")
-        for ax in (above, below):
+            top.plot(path["dx"], path["dy"], color=colour, lw=0.9)
+            top.plot(path["dx"].iloc[-1:], path["dy"].iloc[-1:], color=colour, marker="o", ms=2.5)
+            side.plot(path["dx"], path["dz"], color=colour, lw=1)
+        top.plot(0, 0, color="k", marker="+", ms=5, mew=0.8)
+        top.set_title(f"$\\varphi = ${phi_label(phi)}")
+        own = 1.15 * rows[["dx", "dy"]].abs().to_numpy().max() or 1.0
+        top.set_xlim(-own, own)
+        top.set_ylim(-own, own)
+        top.set_aspect("equal")
+        side.set_xlim(-reach, reach)
+        side.set_ylim(low, high)
+        side.set_box_aspect(SIDE_VIEW)
+        for ax in (top, side):
             ax.xaxis.set_major_locator(MaxNLocator(3, symmetric=True))
-        below.yaxis.set_major_locator(MaxNLocator(3, symmetric=True))
-        below.set_xlabel("$x - x_0$ [$d_p$]")
+        top.yaxis.set_major_locator(MaxNLocator(3, symmetric=True))
+        side.set_xlabel("$x - x_0$ [$d_p$]")
         if column:
-            above.set_yticklabels([])
-    axes[0, 0].set_ylabel("side view: $z - z_0$ [$d_p$]")
-    axes[1, 0].set_ylabel("top view: $y - y_0$ [$d_p$]")
+            side.set_yticklabels([])
+    stretch = (high - low) / (2 * reach) / SIDE_VIEW
+    axes[0, 0].set_ylabel("top view: $y - y_0$ [$d_p$]")
+    axes[1, 0].set_ylabel(f"side view, ${stretch:.2g}\\times$ sideways: $z - z_0$ [$d_p$]")
     _particle_legend(figure, frame)
     return figure
 

@@ -9,7 +9,7 @@ import pandas as pd
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter
 
 from dustfall.files import atomic
 from dustfall.forces import registry
@@ -69,6 +69,9 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 REFERENCE = "0.35"
 """Grey of reference lines and of other people's points."""
+
+FEW_DECADES = 30.0
+"""Ratio of the ends of a logarithmic axis below which it may hold less than two powers of ten."""
 
 PHI_RANGE = (1e-8, 1e-3)
 """Volume fractions at the ends of the colour scale: the same phi has one colour in all figures."""
@@ -135,11 +138,28 @@ def mark_bounds(ax, x, y, relations, along="y", length=14) -> None:
             )
 
 
-def plain_ticks(axis, most=6) -> None:
-    """Number a logarithmic axis of less than two decades in plain numbers, at 1, 2, 3 and 5."""
-    axis.set_major_locator(LogLocator(subs=(1, 2, 3, 5), numticks=most))
-    axis.set_major_formatter("{x:g}")
-    axis.set_minor_formatter(NullFormatter())
+def log_scale(ax, axes: str) -> None:
+    """Make axes ("x", "y" or "xy") logarithmic, numbered in whole powers of ten.
+
+    An axis of less than `FEW_DECADES` is numbered 1, 2, 3, 5, ... instead, in plain numbers from
+    0.001 to 5000 and with a power of ten beyond.
+    """
+    for name in axes:
+        getattr(ax, f"set_{name}scale")("log")
+        axis = getattr(ax, f"{name}axis")
+        axis.set_major_formatter(FuncFormatter(functools.partial(_log_label, axis, False)))
+        axis.set_minor_formatter(FuncFormatter(functools.partial(_log_label, axis, True)))
+
+
+def _log_label(axis, minor, value, _) -> str:
+    low, high = axis.get_view_interval()
+    mantissa, exponent = f"{value:.0e}".split("e")
+    power = f"10^{{{int(exponent)}}}"
+    if high / low >= FEW_DECADES:
+        return f"${power}$" if mantissa == "1" and not minor else ""
+    if mantissa not in ("1", "2", "3", "5"):
+        return ""
+    return f"{value:g}" if 1e-3 <= value < 1e4 else f"${mantissa}\\times {power}$"
 
 
 def phi_colour(volume_fraction: float):

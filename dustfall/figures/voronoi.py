@@ -11,6 +11,7 @@ from dustfall.figures.style import (
     MARKERS,
     REFERENCE,
     SINGLE,
+    log_scale,
     mark_bounds,
     new_figure,
     number_label,
@@ -35,12 +36,12 @@ def voronoi_pdf(frame: pd.DataFrame) -> Figure:
     figure = new_figure(1.4 * SINGLE, 3.4)
     ax = figure.subplots()
     shown = frame[frame["density"] > 0]
-    steady = shown[shown["source"] == "steady state"]
-    for i, (multiple, rows) in enumerate(steady.groupby("galileo_multiple")):
+    settling = shown[shown["source"] == "settling"]
+    for i, (multiple, rows) in enumerate(settling.groupby("galileo_multiple")):
         colour = CATEGORY_COLOURS[i % len(CATEGORY_COLOURS)]
         ax.fill_between(rows["volume"], rows["low"], rows["high"], color=colour, alpha=0.25, lw=0)
         name = r"$\mathrm{Ga}$" if multiple == 1 else f"${multiple:g}\\,\\mathrm{{Ga}}$"
-        ax.plot(rows["volume"], rows["density"], color=colour, label=f"steady state, {name}")
+        ax.plot(rows["volume"], rows["density"], color=colour, label=f"settling, {name}")
     start = shown[shown["source"] == "random start"]
     ax.plot(
         start["volume"],
@@ -57,7 +58,7 @@ def voronoi_pdf(frame: pd.DataFrame) -> Figure:
         rows = frame[frame["source"] == source]
         label = source.replace("theta", r"$\theta$").replace("k =", "$k$ =")
         ax.plot(rows["volume"], rows["density"], color=REFERENCE, ls=line, label=label)
-    ax.set_yscale("log")
+    log_scale(ax, "y")
     ax.set_ylim(1e-3, 2)
     ax.set_xlim(0, 3.5)
     ax.set_xlabel(r"cell volume $V\,/\,\overline{V}$")

@@ -103,9 +103,9 @@ def fit(
     """Train k networks side by side, in place, and leave each at its best validation error.
 
     `tensors` are the normalised inputs (k, m, neighbours, F), envelope (k, m, block inputs) and
-    target (k, m, 1 or 2); `splits` are each network's training and validation rows, `generators` shuffle
-    them. In an epoch all take as many steps as the smallest training set gives. `report(epoch)` is
-    called after each epoch. Returns the histories, in the target's unit. Raises FloatingPointError
+    target (k, m, 1 or 2); `splits` are each network's training and validation rows, `generators`
+    shuffle them. In an epoch all take as many steps as the smallest training set gives.
+    `report(epoch)` is called after each epoch. Returns the histories, in the target's unit. Raises FloatingPointError
     when no validation error of a network was finite.
     """
     *given, target = tensors

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from dustfall.analysis.correlations import (
     coefficient_of_determination,
@@ -28,17 +27,20 @@ def stokeslet_scenes(m=6000, seed=2):
     return r[..., None] * e, 24 * (np.array([0, 1, 0]) - slowing.sum(axis=1))
 
 
-def test_each_neighbour_has_its_own_rank_correlation_and_the_mean_is_over_neighbours():
+def test_each_neighbour_has_its_own_rank_correlation_which_no_monotone_scale_changes():
     rng = np.random.default_rng(8)
-    neighbours = rng.normal(size=(200, 5, 3)) + 3
-    force = rng.normal(size=(200, 3)) + neighbours[:, 0]
+    neighbours = rng.normal(size=(400, 5, 3))
+    force = rng.normal(size=(400, 3))
+    # The vertical force falls with the azimuth of the third neighbour, and with nothing else.
+    force[:, 2] = -np.exp(spherical_coordinates(neighbours)[:, 2, 1])
     table = spearman_by_neighbours(neighbours, force)
-    values = spherical_coordinates(neighbours)
-    expected = [stats.spearmanr(values[:, k, 1], force[:, 2]).statistic for k in range(5)]
     rows = table[(table["coordinate"] == "azimuthal") & (table["component"] == "vertical")]
-    np.testing.assert_allclose(rows["rho_of_neighbour"], expected, atol=1e-13)
-    mean = np.cumsum(np.abs(expected)) / np.arange(1, 6)
-    np.testing.assert_allclose(rows["rho"], mean, atol=1e-13)
+    alone = rows["rho_of_neighbour"].to_numpy()
+    assert alone[2] == pytest.approx(-1)
+    assert np.abs(np.delete(alone, 2)).max() < 0.2
+    np.testing.assert_allclose(rows["rho"] * [1, 2, 3, 4, 5], np.abs(alone).cumsum())
+    scaled = spearman_by_neighbours(neighbours, np.sinh(force))
+    np.testing.assert_allclose(scaled["rho"], table["rho"])
 
 
 def test_stokes_flow_correlates_radius_with_drag_and_azimuth_with_the_spanwise_force_only():

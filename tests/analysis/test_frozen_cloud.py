@@ -18,20 +18,20 @@ def cloud(phi, seed, n=150):
 
 
 def test_five_nearest_are_the_closure():
-    positions, side = cloud(1e-3, 1)
+    positions, length = cloud(1e-3, 1)
     np.testing.assert_allclose(
-        drag_among_nearest(positions, side, slice(20), 5),
-        five_neighbour_drag(positions, side)[:20],
+        drag_among_nearest(positions, length, slice(20), 5),
+        five_neighbour_drag(positions, length)[:20],
         rtol=1e-10,
     )
 
 
 def test_more_neighbours_take_away_more_drag_without_end():
-    positions, side = cloud(1e-3, 2)
-    drag = [drag_among_nearest(positions, side, slice(10), k).mean() for k in (1, 5, 20, 60)]
+    positions, length = cloud(1e-3, 2)
+    drag = [drag_among_nearest(positions, length, slice(10), k).mean() for k in (1, 5, 20, 60)]
     assert (np.diff(drag) < -0.1).all()
     with pytest.raises(ValueError, match="more than half the box"):
-        drag_among_nearest(positions, side, slice(10), 120)
+        drag_among_nearest(positions, length, slice(10), 120)
 
 
 def test_the_whole_cloud_settles_as_slowly_as_theory_says_and_a_fixed_bed_resists():

@@ -8,12 +8,16 @@ from dustfall.analysis.neighbour_changes import neighbour_changes
 
 
 def run(changes, fifth, seed=1):
-    attrs = {"model": "idnn", "n": 1000, "volume_fraction": 1e-3, "galileo": 0.078, "step": 0.1}
+    attrs = {"model": "idnn", "n": 1000, "volume_fraction": 1e-3, "galileo": 0.078}
+    attrs |= {"step": 0.1, "stokes_number": 9.0}
+    still = np.ones(len(changes))
     return xr.Dataset(
         {
             "time": ("step", 0.1 * np.arange(len(changes))),
             "new_neighbours": ("step", changes),
             "only_farthest": ("step", fifth),
+            "settling_velocity_mean": ("step", still),
+            "settling_velocity_variance": ("step", 0 * still),
         },
         attrs=attrs | {"seed": seed},
     )

@@ -11,7 +11,16 @@ from dustfall.analysis.distributions import force_distributions, force_samples
 from dustfall.analysis.evaluation import error_by_gap
 from dustfall.analysis.mesh_study import mesh_study_table
 from dustfall.analysis.settling import inverse_beta_table
-from dustfall.figures.style import PHI_RANGE, STYLE, model_look, phi_colour, phi_label, save
+from dustfall.figures.style import (
+    PHI_RANGE,
+    STYLE,
+    log_scale,
+    model_look,
+    new_figure,
+    phi_colour,
+    phi_label,
+    save,
+)
 from dustfall.forces.formulas import FORMULAS
 from dustfall.forces.registry import FORCE_MODELS, title, trained_models
 
@@ -152,7 +161,7 @@ def trajectories_3d():
 def voronoi_pdf():
     volume = np.linspace(0.05, 3, 30)
     density = volume**4 * np.exp(-5 * volume)
-    sources = {"random start": [np.nan], "steady state": [1.0, 2.0, 4.0]}
+    sources = {"random start": [np.nan], "settling": [1.0, 2.0, 4.0]}
     sources |= {"gamma, k = 5, theta = 0.2": [np.nan], "gamma, k = 5.59": [np.nan]}
     return pd.concat(
         [
@@ -499,6 +508,37 @@ def test_no_two_force_models_look_alike_and_none_goes_by_its_name_in_code():
         figure = getattr(figures, name)(TABLES[name]())
         texts = {text.get_text() for text in figure.findobj(mpl.text.Text)}
         assert not texts & names, name
+
+
+def test_the_side_view_is_stretched_as_it_says():
+    figure = figures.trajectories(trajectories())
+    figure.canvas.draw()
+    side = figure.axes[len(PHI)]
+    (x0, z0), (x1, z1) = side.transData.transform([(0, 0), (1, 1)])
+    stretch = float(side.get_ylabel().split("$")[1].split("\\times")[0])
+    assert (x1 - x0) / (z1 - z0) == pytest.approx(stretch, rel=0.05)
+    (x0, y0), (x1, y1) = figure.axes[0].transData.transform([(0, 0), (1, 1)])
+    assert x1 - x0 == pytest.approx(y1 - y0)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "expected"),
+    [
+        (0.4, 4.0, {"0.5", "1", "2", "3"}),
+        (0.02, 0.09, {"0.02", "0.03", "0.05"}),
+        (2e-6, 9e-6, {f"${k}\\times 10^{{-6}}$" for k in (2, 3, 5)}),
+        (1e-6, 1.0, {f"$10^{{{k}}}$" for k in range(-6, 1)}),
+    ],
+)
+def test_logarithmic_axes_have_whole_powers_or_plain_numbers(low, high, expected):
+    figure = new_figure(3, 3)
+    ax = figure.subplots()
+    log_scale(ax, "y")
+    ax.set_ylim(low, high)
+    figure.canvas.draw()
+    labels = ax.get_yticklabels() + ax.get_yticklabels(minor=True)
+    shown = {t.get_text() for t in labels if low <= t.get_position()[1] <= high} - {""}
+    assert shown == expected
 
 
 def test_r2_and_slope_stand_in_the_panels():

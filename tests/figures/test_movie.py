@@ -8,11 +8,11 @@ from PIL import Image
 from dustfall.figures.movie import DPI, SIZE, SLAB, cloud_picture, cloud_slice, save_movie
 
 
-def trajectory(frames=5, n=400, side=20.0):
+def trajectory(frames=5, n=400, length=20.0):
     rng = np.random.default_rng(n)
     own = rng.normal(1.4, 0.2, n)
     time = np.arange(frames, dtype=float)
-    position = rng.uniform(0, side, (n, 3)) - 90 * time[:, None, None] * [0, 0, 1]
+    position = rng.uniform(0, length, (n, 3)) - 90 * time[:, None, None] * [0, 0, 1]
     velocity = np.zeros((frames, n, 3))
     velocity[:, :, 2] = -own * (1 - np.exp(-time))[:, None]
     dims = ("frame", "atom", "spatial")
@@ -21,7 +21,7 @@ def trajectory(frames=5, n=400, side=20.0):
             "time": ("frame", time),
             "coordinates": (dims, position),
             "velocities": (dims, velocity),
-            "cell_lengths": (("frame", "cell_spatial"), np.full((frames, 3), side)),
+            "cell_lengths": (("frame", "cell_spatial"), np.full((frames, 3), length)),
         },
         attrs={"n": n, "volume_fraction": 1e-3},
     )

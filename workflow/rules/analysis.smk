@@ -4,9 +4,16 @@ rule data_summary:
         data="results/dataset/forces.h5",
         library=library("data_summary.py"),
     output:
-        "results/dataset/summary.json",
+        json="results/dataset/summary.json",
+        forces=report(
+            "results/analysis/force_summary.csv",
+            category="Data set",
+            caption="../report/force_summary.rst",
+        ),
     log:
         "logs/data_summary.log",
+    params:
+        radial_law=config["figures"]["radial_law"],
     script:
         "../scripts/data_summary.py"
 

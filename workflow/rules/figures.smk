@@ -21,11 +21,6 @@ rule figure_force_pdf:
         library=library("figure_force_pdf.py"),
     output:
         **figure("force_pdf", "Data set"),
-        summary=report(
-            "results/analysis/force_summary.csv",
-            category="Data set",
-            caption="../report/force_summary.rst",
-        ),
     log:
         "logs/figures/force_pdf.log",
     params:

@@ -1,4 +1,4 @@
-"""Summarise the forces of each radial law beside the paper's figures, as JSON."""
+"""Summarise the forces of each radial law beside the paper's figures."""
 
 import json
 
@@ -27,6 +27,9 @@ for law in dict.fromkeys(data.radial_law):
         name: table.astype(object).replace({np.nan: None}).to_dict("records")
         for name, table in tables.items()
     }
+    if law == snakemake.params.radial_law:
+        with atomic(snakemake.output.forces) as path:
+            tables["forces"].to_csv(path, index=False)
     print(law, tables["forces"].head(24).to_string(index=False), sep="\n")
-with atomic(snakemake.output[0]) as path:
+with atomic(snakemake.output.json) as path:
     path.write_text(json.dumps(summary, indent=1, allow_nan=False) + "\n", encoding="utf-8")
