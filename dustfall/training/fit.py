@@ -105,8 +105,8 @@ def fit(
     `tensors` are the normalised inputs (k, m, neighbours, F), envelope (k, m, block inputs) and
     target (k, m, 1 or 2); `splits` are each network's training and validation rows, `generators`
     shuffle them. In an epoch all take as many steps as the smallest training set gives.
-    `report(epoch)` is called after each epoch. Returns the histories, in the target's unit. Raises FloatingPointError
-    when no validation error of a network was finite.
+    `report(epoch)` is called after each epoch. Returns the histories, in the target's unit. Raises
+    FloatingPointError when no validation error of a network was finite.
     """
     *given, target = tensors
     size = min(len(training) for training, _ in splits)
