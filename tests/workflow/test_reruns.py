@@ -137,7 +137,7 @@ def test_an_edited_key_reruns_what_depends_on_it_and_nothing_else(rehearsal, set
         ("stokes/records.py", {"stokes": 5} | FROM_DATA),
         ("dataset.py", FROM_DATA),
         ("training/fit.py", MODELS | SETTLING),
-        ("sedimentation/dynamics.py", ALL_SETTLING),
+        ("sedimentation/state.py", ALL_SETTLING),
         ("analysis/voronoi.py", {"random_spheres": 1, **CELLS, "figure_voronoi_variance": 1}),
         ("figures/mesh.py", {"figure_mesh_study": 1}),
         ("progress.py", {}),
