@@ -11,7 +11,7 @@ from snakemake.utils import min_version
 from dustfall.forces.registry import trained_models
 from workflow import plan
 from workflow.configuration import ConfigurationError, configure
-from workflow.library import ROOT, library_files
+from workflow.library import ROOT, digest, library_files
 
 min_version("9.0")
 

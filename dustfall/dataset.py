@@ -12,20 +12,9 @@ import numpy as np
 import pandas as pd
 
 from dustfall.columns import Column, read_columns, write_columns
-from dustfall.scenes import LAWS
+from dustfall.scenes import LAWS, SCENE_COLUMNS
 from dustfall.solution import Status
 from dustfall.streams import Purpose, stream
-
-NEIGHBOURS_OF_SCENES = Column("d_p", "centres of the nearest spheres, sorted by distance")
-VOLUME_FRACTION = Column("1", "phi = 15 V_p / (4 pi d_5^3), d_5 the fifth distance")
-NUMBER = Column("1", "number of the scene within its radial law")
-
-SCENE_COLUMNS = {
-    "neighbours": NEIGHBOURS_OF_SCENES,
-    "volume_fraction": VOLUME_FRACTION,
-    "scene": NUMBER,
-}
-"""Columns of a shard of scenes."""
 
 SOLUTION_COLUMNS = (
     "scene", "force", "status", "error_estimate", "iterations", "residual", "minimum_gap",
@@ -33,11 +22,11 @@ SOLUTION_COLUMNS = (
 """Columns of a shard of force records that the data set reads."""
 
 COLUMNS = {
-    "neighbours": NEIGHBOURS_OF_SCENES,
+    "neighbours": SCENE_COLUMNS["neighbours"],
     "force": Column("Re_p c_D", "force on the reference sphere; an isolated one feels 24 along y"),
-    "volume_fraction": VOLUME_FRACTION,
+    "volume_fraction": SCENE_COLUMNS["volume_fraction"],
     "radial_law": Column("", "law that the distances of the neighbours were drawn by"),
-    "scene": NUMBER,
+    "scene": SCENE_COLUMNS["scene"],
 }
 """Columns of the data set."""
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from dustfall.columns import Column
 from dustfall.streams import Purpose, stream
 from dustfall.units import NEIGHBOURS, SPHERE_VOLUME
 
@@ -22,6 +23,13 @@ DENSEST = FIFTH_SHELL / 2.0**3
 
 MOST_DRAWS = 10_000
 """Draws after which a scene is given up; at `DENSEST` a few hundred suffice."""
+
+SCENE_COLUMNS = {
+    "neighbours": Column("d_p", "centres of the nearest spheres, sorted by distance"),
+    "volume_fraction": Column("1", "phi = 15 V_p / (4 pi d_5^3), d_5 the fifth distance"),
+    "scene": Column("1", "number of the scene within its radial law"),
+}
+"""Columns of a shard of scenes."""
 
 
 def volume_fraction(d5):

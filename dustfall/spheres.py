@@ -85,7 +85,7 @@ def flow_direction(flow) -> np.ndarray:
 
 def checked_tolerance(tolerance, lowest: float, highest: float) -> float:
     """The tolerance as a float; ValueError unless it is a number from `lowest` to `highest`."""
-    if not isinstance(tolerance, numbers.Real) or not lowest <= tolerance <= highest:
+    if not isinstance(tolerance, numbers.Real) or not lowest <= float(tolerance) <= highest:
         raise ValueError(f"tolerance {tolerance!r}: allowed are {lowest:g} to {highest:g}")
     return float(tolerance)
 

@@ -7,17 +7,8 @@ import numpy as np
 import pytest
 
 from dustfall.columns import write_columns
-from dustfall.dataset import (
-    SCENE_COLUMNS,
-    Dataset,
-    Shard,
-    aggregate,
-    check,
-    read,
-    split,
-    summary,
-    write,
-)
+from dustfall.dataset import Dataset, Shard, aggregate, check, read, split, summary, write
+from dustfall.scenes import SCENE_COLUMNS
 from dustfall.solution import Status
 from dustfall.stokes.records import write_records
 

@@ -1,7 +1,8 @@
-"""Which files of the library a script runs: the inputs that make its jobs stale when edited."""
+"""Which files of the library a script runs: its jobs are stale when one of them is edited."""
 
 import ast
-from collections.abc import Iterator
+import hashlib
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
@@ -25,6 +26,19 @@ def library_files(script: str | Path) -> list[str]:
             found.add(path)
             waiting.extend(_imports(path))
     return sorted({path.relative_to(ROOT).as_posix() for path in found} - WITHOUT_RESULTS)
+
+
+def digest(files: Iterable[str]) -> str:
+    """Sixteen hexadecimal digits of the names and the content of files, relative to the root."""
+    found = hashlib.sha256()
+    for file in files:
+        found.update(f"{file} {_content(file)}\n".encode())
+    return found.hexdigest()[:16]
+
+
+@cache
+def _content(file: str) -> str:
+    return hashlib.sha256((ROOT / file).read_bytes()).hexdigest()
 
 
 @cache

@@ -95,8 +95,8 @@ def force_distributions(volume_fraction, force, points=400) -> pd.DataFrame:
             f"there are {len(volume_fraction)} in all"
         )
     columns = ["component", "phi_low", "phi_high", "samples", "force", "density"]
-    law = ["laplace_density", "laplace_ks", "laplace_ks_level"]
-    return pd.concat(tables, ignore_index=True)[columns + law]
+    columns += ["laplace_density", "laplace_ks", "laplace_ks_level"]
+    return pd.concat(tables, ignore_index=True)[columns]
 
 
 def force_summary(volume_fraction, force) -> pd.DataFrame:

@@ -8,7 +8,8 @@ import pandas as pd
 from dustfall.analysis.correlations import coefficient_of_determination
 from dustfall.analysis.distributions import decades
 from dustfall.columns import Column
-from dustfall.dataset import VOLUME_FRACTION, Dataset
+from dustfall.dataset import Dataset
+from dustfall.scenes import SCENE_COLUMNS
 from dustfall.units import COMPONENTS
 
 ANGLE = 1.0
@@ -20,7 +21,7 @@ def prediction_columns(models: Iterable[str]) -> dict[str, Column]:
     return {
         "target": Column("Re_p c_D", "force on the reference sphere"),
         "gap": Column("d_p", "surface distance of the nearest neighbour"),
-        "volume_fraction": VOLUME_FRACTION,
+        "volume_fraction": SCENE_COLUMNS["volume_fraction"],
         "radial_law": Column("", "law that the distances of the neighbours were drawn by"),
         **{model: Column("Re_p c_D", f"force predicted by {model}") for model in models},
     }

@@ -104,7 +104,7 @@ def steadiness(windows: Sequence[xr.Dataset]) -> tuple[str, float]:
     """
     variance = np.mean([float(window["settling_velocity_variance"].mean()) for window in windows])
     mean = np.mean([float(window["settling_velocity_mean"].mean()) for window in windows])
-    spread = np.sqrt(max(variance, 0.0))
+    spread = np.sqrt(max(float(variance), 0.0))
     spacing = np.cbrt(SPHERE_VOLUME / case_of(windows[0])["volume_fraction"])
     duration = np.mean([np.ptp(window["time"].values) for window in windows])
     moved = float(spread * stokes_number(windows[0]) * duration / spacing)
@@ -148,7 +148,9 @@ def steady_state(
     for run in runs:
         for quantity in quantities:
             if quantity not in run:
-                raise ValueError(f"the series has no variable {quantity!r}; it has {sorted(run)}")
+                raise ValueError(
+                    f"the series has no variable {quantity!r}; it has {sorted(map(str, run))}"
+                )
         cases.setdefault(tuple(case_of(run).values()), []).append(run)
     if not cases:
         raise ValueError("there are no runs: at least one series is needed")

@@ -186,7 +186,9 @@ def phase_and_spectra(
             per_frequency = 2 * np.pi / (settling.mean() * number)
             highest = min(fit_frequencies[1], 0.25 / interval)
             limits = (fit_frequencies[0] * per_frequency, highest * per_frequency)
-            law = spectral_slope(*(spectrum[c] for c in spectrum), limits=limits)
+            law = spectral_slope(
+                spectrum["kappa"], spectrum["energy"], spectrum["ordinates"], limits
+            )
             found = {"slope": law.slope, "slope_error": law.standard_error}
             curve = {"panel": "spectrum", "x": spectrum["kappa"], "y": spectrum["energy"]}
             tables.append(pd.DataFrame(head | curve | found))

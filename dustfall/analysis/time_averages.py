@@ -78,9 +78,10 @@ def mean_of_runs(means: list[Mean]) -> Mean:
     k = len(means)
     values = np.array([m.value for m in means])
     if k >= FEWEST_SEEDS:
-        error, freedom = values.std(ddof=1) / np.sqrt(k), k - 1
+        error = values.std(ddof=1) / np.sqrt(k)
+        freedom: float = k - 1
     else:
-        error = np.sqrt(sum(m.standard_error**2 for m in means)) / k
+        error = np.linalg.norm([m.standard_error for m in means]) / k
         freedom = sum(m.degrees_of_freedom for m in means)
     length = float(np.mean([m.correlation_length for m in means]))
     return Mean(float(values.mean()), float(error), freedom, length, means[0].confidence)

@@ -31,7 +31,7 @@ def mesh_study(frame: pd.DataFrame) -> Figure:
     figure = new_figure(DOUBLE, 3.0)
     left, right = figure.subplots(1, 2)
     schemes = [s for s in frame["scheme"].unique() if s != PAPER]
-    looks = {
+    looks: dict[str, dict] = {
         s: {"color": CATEGORY_COLOURS[i % len(CATEGORY_COLOURS)], "marker": MARKERS[i % 7]}
         for i, s in enumerate(schemes)
     }

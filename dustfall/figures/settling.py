@@ -256,7 +256,7 @@ def phase_and_spectra(frame: pd.DataFrame) -> Figure:
     wide = min(3, len(phis))
     high = -(-len(phis) // wide)
     figure = new_figure(DOUBLE, 0.8 + 2.0 * (high + 1))
-    above, below = figure.subfigures(2, 1, height_ratios=[high, 1.15])
+    above, below = figure.subfigures(2, 1, squeeze=False, height_ratios=[high, 1.15]).ravel()
     orbits = above.subplots(high, wide, squeeze=False).ravel()
     for ax, phi in zip(orbits, phis, strict=False):
         _orbits(ax, frame[(frame["panel"] == "phase") & (frame["volume_fraction"] == phi)])

@@ -15,7 +15,7 @@ from dustfall.files import atomic
 from dustfall.forces import registry
 from dustfall.forces.formulas import FORMULAS
 
-STYLE = {
+STYLE: dict = {
     "font.family": "STIXGeneral",
     "mathtext.fontset": "stix",
     "font.size": 9,
@@ -100,7 +100,7 @@ def model_title(model: str) -> str:
     return registry.title(model) if model in registry.FORCE_MODELS else model
 
 
-def model_look(model: str) -> dict[str, str]:
+def model_look(model: str) -> dict:
     """Colour and marker of a force model, the same in all figures.
 
     Closed formulas and the models that a campaign trains come first, with a colour for each; more
@@ -192,7 +192,7 @@ def phi_legend(figure: Figure, volume_fractions: Iterable[float]) -> None:
     )
 
 
-def letter(axes: Sequence) -> None:
+def letter(axes: Iterable) -> None:
     """Name panels (a), (b), … above their upper left corners."""
     for i, ax in enumerate(axes):
         ax.set_title(f"({chr(ord('a') + i)})", loc="left")

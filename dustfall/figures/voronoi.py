@@ -147,7 +147,7 @@ def voronoi_variance(frame: pd.DataFrame) -> Figure:
         for i, n in enumerate(numbers)
     ]
     if (ours["status"] != STEADY).any():
-        look = {"marker": "o", "mfc": "white"}
+        look: dict = {"marker": "o", "mfc": "white"}
         handles.append(Line2D([], [], color="k", ls="none", label="not steady: its end", **look))
     handles += [
         Line2D([], [], color="k", ls="none", marker="x", label="random spheres"),

@@ -22,7 +22,8 @@ def export_onnx(model: LearnedModel, path) -> None:
     add, in the frame of the model, to its baseline. Frame and baseline are geometry and not in it.
     The model's header is the metadata "header", as JSON. Needs the package onnx.
     """
-    nodes, constants = [], []
+    nodes: list = []
+    constants: list = []
     for component, network in model.networks.items():
         _add_network(nodes, constants, component, network)
     features, given = len(network.mean), len(network.block_inputs)

@@ -72,9 +72,11 @@ class NeighbourList:
         self.index = np.empty((particles, number), np.int32)
         self.searched = 0
         self._blocks = blocks
-        self.order = order
+        # Empty until the first update.
+        self.order: np.ndarray = np.empty(0, np.int32) if order is None else order
         self._updates = updates
-        self._wrapped = self._before = None
+        self._wrapped: np.ndarray | None = None
+        self._before: np.ndarray | None = None
         candidates = max(int(np.ceil(CANDIDATES * number)), number + 2)
         self._listed = np.empty((particles, candidates), np.int32)
         self._distance = np.empty((particles, candidates), np.float32)
@@ -94,7 +96,7 @@ class NeighbourList:
             _add_way(self._way, position, self._before, self.box_length)
         self._before = position.copy()
         cells = sort_by_cell(self._wrapped, self.box_length)
-        if self._updates % REORDERED_EVERY == 0 or self.order is None:
+        if self._updates % REORDERED_EVERY == 0 or not self.order.size:
             self.order = cells[1]
             self._length[:] = 0
         self._updates += 1

@@ -154,7 +154,7 @@ def settle(
         "precision": output.precision,
         **asdict(properties),
     }
-    columns = SERIES | closure.series
+    columns = {**SERIES, **closure.series}
     with _working_folder(checkpoint, output) as folder, _terminated() as terminated:
         frame = frame_type(len(start.position), output.precision)
         state, frames, rows = _resume(folder, settings, closure, frame, series_type(columns))
@@ -238,6 +238,8 @@ def _save(folder: Path, settings, state: State, closure: Closure, frames: Record
     frames.sync()
     rows.sync()
     memory = {f"closure.{name}": array for name, array in closure.memory().items()}
+    drag = state.last_drag
+    assert drag is not None, "a state is saved after a step"
     checkpoints.save(
         folder,
         settings,
@@ -245,9 +247,9 @@ def _save(folder: Path, settings, state: State, closure: Closure, frames: Record
             "steps": state.steps,
             "position": state.position,
             "velocity": state.velocity,
-            "beta": state.last_drag.beta,
-            "force": state.last_drag.force,
-            "whole_step": state.last_drag.whole_step,
+            "beta": drag.beta,
+            "force": drag.force,
+            "whole_step": drag.whole_step,
             "frames": frames.count,
             "rows": rows.count,
             **memory,
@@ -281,8 +283,8 @@ def _working_folder(checkpoint: Checkpoint | None, output: Output) -> Iterator[P
     if checkpoint is None:
         parent = Path(output.trajectory).parent
         parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=parent, prefix=".settle.") as folder:
-            yield Path(folder)
+        with tempfile.TemporaryDirectory(dir=parent, prefix=".settle.") as temporary:
+            yield Path(temporary)
     else:
         folder = Path(checkpoint.folder)
         folder.mkdir(parents=True, exist_ok=True)

@@ -75,7 +75,7 @@ class Records:
     def append(self, **values) -> None:
         """Write one record, given field by field."""
         row = np.empty((), self.record)
-        for name in self.record.names:
+        for name in self.record.names or ():
             row[name] = values[name]
         self.file.write(row.tobytes())
         self.count += 1
@@ -147,14 +147,14 @@ def write_trajectory(path: Path, frames: Records, box_length: float, attributes:
         }
         columns = {}
         for name, (units, words) in meaning.items():
-            base, shape = frames.record[name].subdtype
+            field = frames.record[name]
             columns[name] = variable(
                 name,
-                base,
-                ("frame", "atom", "spatial")[: 1 + len(shape)],
+                field.base,
+                ("frame", "atom", "spatial")[: 1 + field.ndim],
                 units,
                 words,
-                chunksizes=(1, *shape),
+                chunksizes=(1, *field.shape),
             )
         for k, frame in enumerate(frames):
             time[k] = frame["time"]

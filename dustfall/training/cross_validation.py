@@ -95,8 +95,8 @@ def choose_winner(results: list[dict]) -> dict:
     """
     if not results:
         raise ValueError("there are no cross-validation results to choose from")
-    errors = {component: {} for component in COMPONENTS}
-    parameters = {}
+    errors: dict[str, dict[str, np.ndarray]] = {component: {} for component in COMPONENTS}
+    parameters: dict[str, int] = {}
     for result in results:
         layers = result["layers"]
         errors[result["component"]][layers] = np.array([fold["mse"] for fold in result["folds"]])
@@ -110,7 +110,7 @@ def choose_winner(results: list[dict]) -> dict:
     if len({len(table[layers]) for table in errors.values() for layers in table}) != 1:
         raise ValueError("streamwise and lateral results have different numbers of folds")
     smallest = {c: min(error.mean() for error in table.values()) for c, table in errors.items()}
-    rows = []
+    rows: list[dict] = []
     for layers in parameters:
         error = np.mean([table[layers] / smallest[c] for c, table in errors.items()], axis=0)
         rows.append(

@@ -288,8 +288,8 @@ def train_networks(
         zip(means, scales, units, histories, strict=True)
     ):
         blocks = [
-            [layer.of_network(k) for layer in block if isinstance(layer, Affine)]
-            for block in networks.blocks
+            [layer.of_network(k) for layer in block.children() if isinstance(layer, Affine)]
+            for block in networks.blocks.children()
         ]
         errors = [error * unit**2 for error in history.validation_error]
         given = block_inputs(KINDS[kind].blocks, neighbours)

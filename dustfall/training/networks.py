@@ -43,8 +43,8 @@ class Block(nn.Sequential):
     """
 
     def __init__(self, widths: list[int], activation: str, generators: list[torch.Generator]):
-        layers = []
-        gain = nn.init.calculate_gain(activation)
+        layers: list[nn.Module] = []
+        gain = nn.init.calculate_gain(activation)  # type: ignore[arg-type]
         for wide, narrow in pairwise(widths[:-1]):
             layers.append(Affine(wide, narrow, gain, True, generators))
             layers.append(nn.Tanh() if activation == "tanh" else nn.ReLU())
@@ -67,7 +67,7 @@ class BlockSum(nn.Module):
     def forward(self, inputs: torch.Tensor, envelope: torch.Tensor) -> torch.Tensor:
         """Map normalised inputs (k, b, neighbours, F) and envelope (k, b, block inputs)."""
         k, b = inputs.shape[:2]
-        total = 0.0
+        total = envelope.new_zeros(())
         for (rows, neighbours), block in zip(self.pieces, self.blocks, strict=True):
             weights = envelope[:, :, rows, None]
             times = weights.shape[2]
@@ -78,7 +78,7 @@ class BlockSum(nn.Module):
 
 def build(
     kind: str, layers: str, component: str, neighbours: int, generators: list[torch.Generator]
-) -> nn.Module:
+) -> BlockSum:
     """Return networks of one component with random weights, one drawn from each generator."""
     blocks = [
         Block(widths, ACTIVATION[component], generators)

@@ -46,6 +46,16 @@ class Project:
         """Jobs that a dry run announces, by rule; the target rule `all` is left out."""
         return jobs_of(self.dry_run(*arguments))
 
+    def add_documented_formula(self) -> Path:
+        """Put the force model of docs/extend.md where closed formulas lie; return its file."""
+        page = (ROOT / "docs/extend.md").read_text(encoding="utf-8")
+        blocks = re.findall(r"```python\n(.*?)```", page, re.S)
+        code = next(block for block in blocks if "MODEL" in block)
+        assert len(code.splitlines()) <= 20
+        file = self.folder / "dustfall/forces/formulas/screened.py"
+        file.write_text(code)
+        return file
+
 
 def jobs_of(words: str) -> dict[str, int]:
     """Jobs by rule, from the words of a dry run; the target rule `all` is left out."""

@@ -43,3 +43,21 @@ def test_a_lost_result_is_made_again_with_the_same_bytes(campaign):
     figure.unlink()
     campaign.run(*SMOKE, "--", "all")
     assert figure.read_bytes() == before
+
+
+def test_a_formula_added_as_one_file_appears_in_tables_and_figures(campaign):
+    formula = campaign.add_documented_formula()
+    name = formula.stem
+    try:
+        campaign.run(
+            *SMOKE, "--config", f"sedimentation={{models: [{name}]}}", "--",
+            "results/model/evaluation.csv", "results/figures/error_by_distance.csv",
+            "results/figures/inverse_beta.csv", "results/analysis/steady_state.csv",
+        )  # fmt: skip
+    finally:
+        formula.unlink()
+    results = campaign.folder / "results"
+    assert f"\n{name}," in (results / "model/evaluation.csv").read_text()
+    assert f"\n{name}," in (results / "analysis/steady_state.csv").read_text()
+    for figure in ("error_by_distance", "inverse_beta"):
+        assert "screened" in (results / f"figures/{figure}.csv").read_text(), figure

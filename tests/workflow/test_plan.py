@@ -166,3 +166,11 @@ def test_compared_models_share_the_starts_of_the_smallest_cases():
         assert case.start in cases
         assert plan.force_model(config, name) == "isolated"
         assert plan.force_model(config, case.start) == "idnn"
+
+
+def test_a_formula_added_as_one_file_is_allowed_and_its_cases_are_planned(project):
+    name = project.add_documented_formula().stem
+    words = project.dry_run("--config", f"sedimentation={{model: {name}}}", "--", "all")
+    assert f"n1000_phi1e-03_ga1_seed3_{name}.nc" not in words  # it is the campaign's own model
+    words = project.dry_run("--", "all")
+    assert f"results/sedimentation/n1000_phi1e-03_ga1_seed3_{name}.nc" in words

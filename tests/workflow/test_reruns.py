@@ -10,8 +10,8 @@ from workflow.readers import read_by, readers
 
 SMOKE = ("--configfile", "config/smoke.yaml")
 READERS = readers()
-OF_CASES = {"sedimentation.galileo.multiples", "sedimentation.models"}
-"""Keys of cases that some of the rules that gather cases do not take."""
+CHOSEN_FROM = {"idnn.layers_of.dense", "sedimentation.galileo.multiples", "sedimentation.models"}
+"""Keys of models or cases that some of the rules which look the key up leave out."""
 
 SHARDS = {"scenes": 5, "stokes": 5}
 DATA_FIGURES = {"figure_force_scatter": 1, "figure_force_pdf": 1, "figure_spearman": 1}
@@ -126,7 +126,7 @@ def test_an_edited_key_reruns_what_depends_on_it_and_nothing_else(rehearsal, set
     keys = leaves(section, inner)
     reading = {rule for key in keys for rule in read_by(key, READERS)}
     assert changed_themselves(words) <= reading | {"configuration"}
-    if not OF_CASES.intersection(keys):
+    if not CHOSEN_FROM.intersection(keys):
         assert reading & rehearsal.rules <= set(jobs)
 
 
@@ -137,7 +137,7 @@ def test_an_edited_key_reruns_what_depends_on_it_and_nothing_else(rehearsal, set
         ("stokes/records.py", {"stokes": 5} | FROM_DATA),
         ("dataset.py", FROM_DATA),
         ("training/fit.py", MODELS | SETTLING),
-        ("sedimentation/dynamics.py", ALL_SETTLING),
+        ("sedimentation/settle.py", ALL_SETTLING),
         ("analysis/voronoi.py", {"random_spheres": 1, **CELLS, "figure_voronoi_variance": 1}),
         ("figures/mesh.py", {"figure_mesh_study": 1}),
         ("progress.py", {}),
@@ -157,3 +157,15 @@ def test_a_new_time_of_a_library_file_is_no_edit(rehearsal):
     for path in (rehearsal.folder / "dustfall").rglob("*.py"):
         path.touch()
     assert rehearsal.plan(*SMOKE, "--", "all") == {}
+
+
+def test_a_formula_added_as_one_file_reruns_what_compares_models_and_no_training(rehearsal):
+    formula = rehearsal.add_documented_formula()
+    try:
+        jobs = rehearsal.plan(*SMOKE, "--config", "sedimentation={models: [formulas]}", "--", "all")
+    finally:
+        formula.unlink()
+    assert "evaluation" in jobs
+    assert not {"stokes", "dataset", "sweep", "model", "trial"} & set(jobs)
+    # The new formula and two that the smoke campaign leaves out, at three volume fractions.
+    assert jobs["sedimentation"] == 3 * 3

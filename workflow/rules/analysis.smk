@@ -2,7 +2,6 @@ rule data_summary:
     """What the paper states of its forces, and all rank correlations, for each radial law."""
     input:
         data="results/dataset/forces.h5",
-        library=library("data_summary.py"),
     output:
         json="results/dataset/summary.json",
         forces=report(
@@ -13,6 +12,7 @@ rule data_summary:
     log:
         "logs/data_summary.log",
     params:
+        library=library("data_summary.py"),
         radial_law=config["figures"]["radial_law"],
     script:
         "../scripts/data_summary.py"
@@ -20,8 +20,6 @@ rule data_summary:
 
 rule mesh_study:
     """Drag on an isolated sphere against mesh size, for each discretisation."""
-    input:
-        library=library("mesh_study.py"),
     output:
         study="results/analysis/mesh_study.csv",
         convergence="results/analysis/grid_convergence.csv",
@@ -30,6 +28,7 @@ rule mesh_study:
     benchmark:
         "benchmarks/analysis/mesh_study.tsv"
     params:
+        library=library("mesh_study.py"),
         sizes=config["meshing"]["study_sizes"],
     script:
         "../scripts/mesh_study.py"
@@ -39,7 +38,6 @@ rule steady_state:
     """Average every case over its steady state."""
     input:
         series=expand("results/sedimentation/{case}.series.nc", case=CASES),
-        library=library("steady_state.py"),
     output:
         report(
             "results/analysis/steady_state.csv",
@@ -49,6 +47,7 @@ rule steady_state:
     log:
         "logs/analysis/steady_state.log",
     params:
+        library=library("steady_state.py"),
         statistics_from=config["sedimentation"]["statistics_from"],
     script:
         "../scripts/steady_state.py"
@@ -58,7 +57,6 @@ rule independence_of_n:
     """Test whether the averages depend on the number of particles."""
     input:
         steady="results/analysis/steady_state.csv",
-        library=library("independence_of_n.py"),
     output:
         report(
             "results/analysis/independence_of_n.csv",
@@ -67,6 +65,8 @@ rule independence_of_n:
         ),
     log:
         "logs/analysis/independence_of_n.log",
+    params:
+        library=library("independence_of_n.py"),
     script:
         "../scripts/independence_of_n.py"
 
@@ -75,7 +75,6 @@ rule neighbour_changes:
     """Count how often the five nearest neighbours change."""
     input:
         series=expand("results/sedimentation/{case}.series.nc", case=CASES),
-        library=library("neighbour_changes.py"),
     output:
         report(
             "results/analysis/neighbour_changes.csv",
@@ -85,6 +84,7 @@ rule neighbour_changes:
     log:
         "logs/analysis/neighbour_changes.log",
     params:
+        library=library("neighbour_changes.py"),
         statistics_from=config["sedimentation"]["statistics_from"],
     script:
         "../scripts/neighbour_changes.py"
@@ -94,7 +94,6 @@ rule voronoi_cells:
     """Volumes of the Voronoi cells in some frames of a case."""
     input:
         trajectory="results/sedimentation/{case}.nc",
-        library=library("voronoi_cells.py"),
     output:
         "results/analysis/voronoi/{case}.nc",
     log:
@@ -102,6 +101,7 @@ rule voronoi_cells:
     benchmark:
         "benchmarks/analysis/voronoi/{case}.tsv"
     params:
+        library=library("voronoi_cells.py"),
         statistics_from=config["sedimentation"]["statistics_from"],
         snapshots=config["figures"]["snapshots"],
     script:
@@ -110,8 +110,6 @@ rule voronoi_cells:
 
 rule random_spheres:
     """Voronoi volumes of random spheres, to compare the settling ones with."""
-    input:
-        library=library("random_spheres.py"),
     output:
         "results/analysis/random_spheres.csv",
     log:
@@ -119,6 +117,7 @@ rule random_spheres:
     benchmark:
         "benchmarks/analysis/random_spheres.tsv"
     params:
+        library=library("random_spheres.py"),
         seed=config["seed"],
         volume_fractions=config["sedimentation"]["volume_fractions"],
     script:

@@ -4,12 +4,12 @@ rule prediction_benchmark:
         data="results/dataset/forces.h5",
         scores="results/model/evaluation.csv",
         models=expand("results/model/{model}.safetensors", model=LEARNED_MODELS),
-        library=library("prediction_benchmark.py"),
     output:
         **figure("accuracy_vs_cost", "Force models"),
     log:
         "logs/benchmarks/prediction.log",
     params:
+        library=library("prediction_benchmark.py"),
         radial_law=config["figures"]["radial_law"],
     script:
         "../scripts/prediction_benchmark.py"
@@ -17,8 +17,6 @@ rule prediction_benchmark:
 
 rule solver_benchmark:
     """Run time of the Stokes solver, its rungs, references and peers against the error."""
-    input:
-        library=library("solver_benchmark.py"),
     output:
         error="results/benchmarks/solver.csv",
         picture="results/benchmarks/solver.png",
@@ -27,6 +25,7 @@ rule solver_benchmark:
     log:
         "logs/benchmarks/solver.log",
     params:
+        library=library("solver_benchmark.py"),
         seed=config["seed"],
         phi_min=config["scenes"]["phi_min"],
         phi_max=config["scenes"]["phi_max"],
@@ -40,13 +39,12 @@ rule solver_benchmark:
 
 rule stress:
     """Gaps, distances, turns and condition numbers that strain the solver."""
-    input:
-        library=library("stress.py"),
     output:
         "results/benchmarks/stress.csv",
     log:
         "logs/benchmarks/stress.log",
     params:
+        library=library("stress.py"),
         tolerances=config["benchmarks"]["tolerances"],
     script:
         "../scripts/stress.py"

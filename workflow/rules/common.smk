@@ -11,20 +11,20 @@ wildcard_constraints:
 
 
 def library(script):
-    """Library files that `workflow/scripts/<script>` runs, as inputs of its job."""
-    root = os.path.relpath(ROOT)
-    files = library_files(ROOT / "workflow" / "scripts" / script)
-    return [os.path.normpath(os.path.join(root, file)) for file in files]
+    """Digest of the library files that `workflow/scripts/<script>` runs, a parameter of its job.
+
+    As inputs they would rerun the job as well, and fill the terminal.
+    """
+    return digest(library_files(ROOT / "workflow" / "scripts" / script))
 
 
 def settling_library(model):
-    """Library files that settling with a force model runs: those of its formula, if it is one."""
-    files = library("settle.py")
-    formula = ROOT / "dustfall" / "forces" / "formulas" / f"{model}.py"
+    """Digest of the library files that settling with a force model runs: with its formula's."""
+    files = library_files(ROOT / "workflow" / "scripts" / "settle.py")
     if model not in LEARNED_MODELS:
-        own = [formula, *(ROOT / file for file in library_files(formula))]
-        files = sorted({*files, *(os.path.relpath(file) for file in own)})
-    return files
+        formula = f"dustfall/forces/formulas/{model}.py"
+        files = sorted({*files, formula, *library_files(ROOT / formula)})
+    return digest(files)
 
 
 def figure(name, category):

@@ -3,7 +3,6 @@ rule dataset:
     input:
         scenes=expand("results/scenes/{shard}.h5", shard=SHARDS),
         solutions=expand("results/stokes/{shard}.h5", shard=SHARDS),
-        library=library("dataset.py"),
     output:
         data="results/dataset/forces.h5",
         summary=report(
@@ -16,6 +15,7 @@ rule dataset:
     benchmark:
         "benchmarks/dataset.tsv"
     params:
+        library=library("dataset.py"),
         seed=config["seed"],
         numbers=config["scenes"]["number"],
         phi_min=config["scenes"]["phi_min"],

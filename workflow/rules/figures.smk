@@ -2,12 +2,12 @@ rule figure_force_scatter:
     """Force components against volume fraction."""
     input:
         data="results/dataset/forces.h5",
-        library=library("figure_force_scatter.py"),
     output:
         **figure("force_scatter", "Data set"),
     log:
         "logs/figures/force_scatter.log",
     params:
+        library=library("figure_force_scatter.py"),
         radial_law=config["figures"]["radial_law"],
         samples=config["figures"]["samples"],
     script:
@@ -18,12 +18,12 @@ rule figure_force_pdf:
     """P.d.f. of the force in each decade of volume fraction."""
     input:
         data="results/dataset/forces.h5",
-        library=library("figure_force_pdf.py"),
     output:
         **figure("force_pdf", "Data set"),
     log:
         "logs/figures/force_pdf.log",
     params:
+        library=library("figure_force_pdf.py"),
         radial_law=config["figures"]["radial_law"],
     script:
         "../scripts/figure_force_pdf.py"
@@ -33,12 +33,12 @@ rule figure_spearman:
     """Rank correlation of neighbour coordinates with the force."""
     input:
         data="results/dataset/forces.h5",
-        library=library("figure_spearman.py"),
     output:
         **figure("spearman", "Data set"),
     log:
         "logs/figures/spearman.log",
     params:
+        library=library("figure_spearman.py"),
         radial_law=config["figures"]["radial_law"],
     script:
         "../scripts/figure_spearman.py"
@@ -48,12 +48,12 @@ rule figure_predicted_vs_target:
     """Predicted against target force on scenes that no model was trained on."""
     input:
         predictions="results/model/predictions.h5",
-        library=library("figure_predicted_vs_target.py"),
     output:
         **figure("predicted_vs_target", "Force models"),
     log:
         "logs/figures/predicted_vs_target.log",
     params:
+        library=library("figure_predicted_vs_target.py"),
         radial_law=config["figures"]["radial_law"],
         samples=config["figures"]["samples"],
     script:
@@ -64,11 +64,12 @@ rule figure_error_by_distance:
     """Error of the force models against the gap to the nearest neighbour."""
     input:
         predictions="results/model/predictions.h5",
-        library=library("figure_error_by_distance.py"),
     output:
         **figure("error_by_distance", "Force models"),
     log:
         "logs/figures/error_by_distance.log",
+    params:
+        library=library("figure_error_by_distance.py"),
     script:
         "../scripts/figure_error_by_distance.py"
 
@@ -77,11 +78,12 @@ rule figure_learning_curve:
     """What is left unexplained against the number of training scenes."""
     input:
         table="results/model/learning_curve.csv",
-        library=library("figure_learning_curve.py"),
     output:
         **figure("learning_curve", "Force models"),
     log:
         "logs/figures/learning_curve.log",
+    params:
+        library=library("figure_learning_curve.py"),
     script:
         "../scripts/figure_learning_curve.py"
 
@@ -90,11 +92,12 @@ rule figure_inverse_beta:
     """Steady settling velocity against volume fraction."""
     input:
         steady="results/analysis/steady_state.csv",
-        library=library("figure_inverse_beta.py"),
     output:
         **figure("inverse_beta", "Sedimentation"),
     log:
         "logs/figures/inverse_beta.log",
+    params:
+        library=library("figure_inverse_beta.py"),
     script:
         "../scripts/figure_inverse_beta.py"
 
@@ -103,11 +106,12 @@ rule figure_settling_in_time:
     """Mean and variance of the settling velocity in time."""
     input:
         series=expand("results/sedimentation/{case}.series.nc", case=PLAIN_CASES),
-        library=library("figure_settling_in_time.py"),
     output:
         **figure("settling_in_time", "Sedimentation"),
     log:
         "logs/figures/settling_in_time.log",
+    params:
+        library=library("figure_settling_in_time.py"),
     script:
         "../scripts/figure_settling_in_time.py"
 
@@ -116,12 +120,12 @@ rule figure_phase_and_spectra:
     """Phase diagrams and energy spectra of the tracked particles."""
     input:
         series=expand("results/sedimentation/{case}.series.nc", case=LARGEST_CASES),
-        library=library("figure_phase_and_spectra.py"),
     output:
         **figure("phase_and_spectra", "Sedimentation"),
     log:
         "logs/figures/phase_and_spectra.log",
     params:
+        library=library("figure_phase_and_spectra.py"),
         statistics_from=config["sedimentation"]["statistics_from"],
         fit_frequencies=config["figures"]["fit_frequencies"],
         spectrum=config["figures"]["spectrum"],
@@ -133,12 +137,12 @@ rule figure_cloud_spectra:
     """Energy spectra averaged over all particles, with and without a window."""
     input:
         trajectories=expand("results/sedimentation/{case}.nc", case=LARGEST_CASES),
-        library=library("figure_cloud_spectra.py"),
     output:
         **figure("cloud_spectra", "Sedimentation"),
     log:
         "logs/figures/cloud_spectra.log",
     params:
+        library=library("figure_cloud_spectra.py"),
         statistics_from=config["sedimentation"]["statistics_from"],
         fit_frequencies=config["figures"]["fit_frequencies"],
     script:
@@ -149,12 +153,12 @@ rule figure_ergodicity:
     """Time average against ensemble average of the settling velocity."""
     input:
         trajectories=expand("results/sedimentation/{case}.nc", case=LARGEST_CASES),
-        library=library("figure_ergodicity.py"),
     output:
         **figure("ergodicity", "Sedimentation"),
     log:
         "logs/figures/ergodicity.log",
     params:
+        library=library("figure_ergodicity.py"),
         statistics_from=config["sedimentation"]["statistics_from"],
     script:
         "../scripts/figure_ergodicity.py"
@@ -164,11 +168,12 @@ rule figure_trajectories:
     """Paths of the tracked particles, unwrapped."""
     input:
         series=expand("results/sedimentation/{case}.series.nc", case=LARGEST_CASES),
-        library=library("figure_trajectories.py"),
     output:
         **figure("trajectories", "Sedimentation"),
     log:
         "logs/figures/trajectories.log",
+    params:
+        library=library("figure_trajectories.py"),
     script:
         "../scripts/figure_trajectories.py"
 
@@ -177,11 +182,12 @@ rule figure_trajectories_3d:
     """The same paths in space."""
     input:
         series=expand("results/sedimentation/{case}.series.nc", case=LARGEST_CASES),
-        library=library("figure_trajectories_3d.py"),
     output:
         **figure("trajectories_3d", "Sedimentation"),
     log:
         "logs/figures/trajectories_3d.log",
+    params:
+        library=library("figure_trajectories_3d.py"),
     script:
         "../scripts/figure_trajectories_3d.py"
 
@@ -190,7 +196,6 @@ rule movie:
     """A slab of the densest cloud as it settles, coloured by velocity."""
     input:
         trajectory=f"results/sedimentation/{LARGEST_CASES[-1]}.nc",
-        library=library("movie.py"),
     output:
         report(
             "results/figures/settling_cloud.gif",
@@ -202,6 +207,7 @@ rule movie:
     benchmark:
         "benchmarks/figures/settling_cloud.tsv"
     params:
+        library=library("movie.py"),
         pictures=config["figures"]["movie_pictures"],
     script:
         "../scripts/movie.py"
@@ -211,7 +217,6 @@ rule figure_voronoi_pdf:
     """P.d.f. of Voronoi volumes at each Galileo number."""
     input:
         cells=expand("results/analysis/voronoi/{case}.nc", case=GALILEO_CASES),
-        library=library("figure_voronoi_pdf.py"),
     output:
         **figure("voronoi_pdf", "Sedimentation"),
     log:
@@ -219,6 +224,7 @@ rule figure_voronoi_pdf:
     benchmark:
         "benchmarks/figures/voronoi_pdf.tsv"
     params:
+        library=library("figure_voronoi_pdf.py"),
         seed=config["seed"],
         statistics_from=config["sedimentation"]["statistics_from"],
     script:
@@ -231,7 +237,6 @@ rule figure_voronoi_variance:
         steady="results/analysis/steady_state.csv",
         spheres="results/analysis/random_spheres.csv",
         cells=expand("results/analysis/voronoi/{case}.nc", case=PLAIN_CASES),
-        library=library("figure_voronoi_variance.py"),
     output:
         **figure("voronoi_variance", "Sedimentation"),
     log:
@@ -239,6 +244,7 @@ rule figure_voronoi_variance:
     benchmark:
         "benchmarks/figures/voronoi_variance.tsv"
     params:
+        library=library("figure_voronoi_variance.py"),
         seed=config["seed"],
         statistics_from=config["sedimentation"]["statistics_from"],
     script:
@@ -247,8 +253,6 @@ rule figure_voronoi_variance:
 
 rule figure_frozen_cloud:
     """Five neighbours against all particles in frozen random clouds."""
-    input:
-        library=library("figure_frozen_cloud.py"),
     output:
         **figure("frozen_cloud", "Sedimentation"),
     log:
@@ -256,6 +260,7 @@ rule figure_frozen_cloud:
     benchmark:
         "benchmarks/figures/frozen_cloud.tsv"
     params:
+        library=library("figure_frozen_cloud.py"),
         seed=config["seed"],
         volume_fractions=config["sedimentation"]["volume_fractions"],
         particles=config["figures"]["frozen_cloud"]["particles"],
@@ -268,10 +273,11 @@ rule figure_mesh_study:
     """Drag on an isolated sphere against mesh size."""
     input:
         study="results/analysis/mesh_study.csv",
-        library=library("figure_mesh_study.py"),
     output:
         **figure("mesh_study", "Stokes solver"),
     log:
         "logs/figures/mesh_study.log",
+    params:
+        library=library("figure_mesh_study.py"),
     script:
         "../scripts/figure_mesh_study.py"

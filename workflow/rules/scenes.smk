@@ -1,12 +1,11 @@
 rule scenes:
     """Draw the scenes of a shard; each depends on the seed and its own number alone."""
-    input:
-        library=library("scenes.py"),
     output:
         "results/scenes/{law}-{shard}.h5",
     log:
         "logs/scenes/{law}-{shard}.log",
     params:
+        library=library("scenes.py"),
         seed=config["seed"],
         numbers=lambda wc: plan.shard_scenes(config, wc.law, wc.shard),
         phi_min=config["scenes"]["phi_min"],

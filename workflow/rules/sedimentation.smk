@@ -3,7 +3,6 @@ rule sedimentation:
     input:
         model=lambda wc: trained(plan.force_model(config, wc.case)),
         start=lambda wc: plan.start_file(config, wc.case),
-        library=lambda wc: settling_library(plan.force_model(config, wc.case)),
     output:
         trajectory="results/sedimentation/{case}.nc",
         series="results/sedimentation/{case}.series.nc",
@@ -16,6 +15,7 @@ rule sedimentation:
     resources:
         checkpoint_interval=config["sedimentation"]["checkpoint_interval"],
     params:
+        library=lambda wc: settling_library(plan.force_model(config, wc.case)),
         seed=config["seed"],
         stream=lambda wc: plan.start_stream(CASES[wc.case].start),
         model=lambda wc: plan.force_model(config, wc.case),

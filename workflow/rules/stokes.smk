@@ -2,7 +2,6 @@ rule stokes:
     """Plan and solve the Stokes problem of every scene of a shard."""
     input:
         scenes="results/scenes/{law}-{shard}.h5",
-        library=library("solve.py"),
     output:
         "results/stokes/{law}-{shard}.h5",
     log:
@@ -10,6 +9,7 @@ rule stokes:
     benchmark:
         "benchmarks/stokes/{law}-{shard}.tsv"
     params:
+        library=library("solve.py"),
         tolerance=config["stokes"]["tolerance"],
     script:
         "../scripts/solve.py"

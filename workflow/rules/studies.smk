@@ -7,7 +7,6 @@ rule study_of_a_step:
             otherwise=[],
         ),
         start=[],
-        library=settling_library(config["sedimentation"]["model"]),
     output:
         trajectory=temp("results/studies/{case}.nc"),
         series="results/studies/{case}.series.nc",
@@ -18,6 +17,7 @@ rule study_of_a_step:
     resources:
         checkpoint_interval=config["sedimentation"]["checkpoint_interval"],
     params:
+        library=settling_library(config["sedimentation"]["model"]),
         # The same start for each step.
         seed=config["seed"],
         stream=plan.start_stream("step"),
@@ -40,12 +40,12 @@ rule step_size:
     """Mean and variance of the settling velocity against the time step."""
     input:
         series=[f"results/studies/step{step:.15g}.series.nc" for step in config["studies"]["steps"]],
-        library=library("step_size.py"),
     output:
         "results/studies/step_size.csv",
     log:
         "logs/studies/step_size.log",
     params:
+        library=library("step_size.py"),
         statistics_from=config["studies"]["statistics_from"],
         together=config["studies"]["together"],
     script:

@@ -2,7 +2,6 @@ rule sweep:
     """Cross-validate one configuration of layers for one component."""
     input:
         data="results/dataset/forces.h5",
-        library=library("sweep.py"),
     output:
         "results/sweep/{component}/{layers}.json",
     log:
@@ -10,6 +9,7 @@ rule sweep:
     benchmark:
         "benchmarks/sweep/{component}/{layers}.tsv"
     params:
+        library=library("sweep.py"),
         seed=config["seed"],
         test_share=config["dataset"]["test_share"],
         laws=config["idnn"]["laws"],
@@ -26,7 +26,6 @@ rule winner:
     """Compare the configurations and choose one a component."""
     input:
         results=expand("results/sweep/{trial}.json", trial=TRIALS),
-        library=library("winner.py"),
     output:
         table=report(
             "results/sweep/summary.csv", category="Force models", caption="../report/sweep.rst"
@@ -34,6 +33,8 @@ rule winner:
         winner="results/sweep/winner.json",
     log:
         "logs/winner.log",
+    params:
+        library=library("winner.py"),
     script:
         "../scripts/winner.py"
 
@@ -43,7 +44,6 @@ rule model:
     input:
         data="results/dataset/forces.h5",
         winner=lambda wc: "results/sweep/winner.json" if wc.model == "idnn" else [],
-        library=library("train.py"),
     output:
         "results/model/{model}.safetensors",
     log:
@@ -51,6 +51,7 @@ rule model:
     benchmark:
         "benchmarks/model/{model}.tsv"
     params:
+        library=library("train.py"),
         seed=config["seed"],
         test_share=config["dataset"]["test_share"],
         laws=lambda wc: plan.laws(config, wc.model),
@@ -66,7 +67,6 @@ rule trial:
     """Train a model on some scenes and score it on the test scenes: one point of a comparison."""
     input:
         data="results/dataset/forces.h5",
-        library=library("trial.py"),
     output:
         "results/trials/{model}-{layers}-{number}.csv",
     log:
@@ -74,6 +74,7 @@ rule trial:
     benchmark:
         "benchmarks/trials/{model}-{layers}-{number}.tsv"
     params:
+        library=library("trial.py"),
         seed=config["seed"],
         test_share=config["dataset"]["test_share"],
         laws=lambda wc: plan.trial_laws(config, wc.model, wc.number),
@@ -122,7 +123,6 @@ rule evaluation:
     input:
         data="results/dataset/forces.h5",
         models=expand("results/model/{model}.safetensors", model=LEARNED_MODELS),
-        library=library("evaluation.py"),
     output:
         table=report(
             "results/model/evaluation.csv",
@@ -138,6 +138,7 @@ rule evaluation:
     log:
         "logs/evaluation.log",
     params:
+        library=library("evaluation.py"),
         seed=config["seed"],
         test_share=config["dataset"]["test_share"],
     script:

@@ -4,8 +4,7 @@ import numpy as np
 
 import joblog
 from dustfall.columns import write_columns
-from dustfall.dataset import SCENE_COLUMNS
-from dustfall.scenes import random_scenes
+from dustfall.scenes import SCENE_COLUMNS, random_scenes
 
 joblog.start(snakemake.log[0])
 params = snakemake.params

@@ -4,7 +4,7 @@ import numpy as np
 
 import joblog
 from dustfall.columns import read_columns
-from dustfall.dataset import SCENE_COLUMNS
+from dustfall.scenes import SCENE_COLUMNS
 from dustfall.solution import Status
 from dustfall.stokes.records import solve_shard, write_records
 

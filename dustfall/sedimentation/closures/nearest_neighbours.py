@@ -64,7 +64,6 @@ class NearestNeighbours(Closure):
             raise ValueError(f"{neighbours} neighbours: the model takes {own}")
         self.model = model
         self.threads = threads
-        self._blocks: Blocks | None = None
         self._nearest: NeighbourList | None = None
         self._order: np.ndarray | None = None
         self._index: np.ndarray | None = None
@@ -73,8 +72,16 @@ class NearestNeighbours(Closure):
     def __call__(self, state: State) -> Drag:
         """Return the drag of the moment. Raises FloatingPointError for a force not finite."""
         if self._nearest is None:
-            self._begin(state)
-        blocks, nearest = self._blocks, self._nearest
+            self._blocks = Blocks(len(state.position), self.threads)
+            self._nearest = NeighbourList(
+                len(state.position),
+                state.box_length,
+                self._blocks,
+                self.neighbours,
+                self._order,
+                updates=state.steps,
+            )
+        nearest = self._nearest
         before, self._index = self._index, nearest.update(state.position)
         self._index_before = self._index if before is None else before
         velocity = state.velocity
@@ -86,24 +93,17 @@ class NearestNeighbours(Closure):
                 self.model, velocity[rows], nearest.vectors(rows), rows
             )
 
-        blocks.run(work)
+        self._blocks.run(work)
         return Drag(beta, lateral)
 
-    def _begin(self, state: State) -> None:
-        particles = len(state.position)
-        self._blocks = Blocks(particles, self.threads)
-        self._nearest = NeighbourList(
-            particles,
-            state.box_length,
-            self._blocks,
-            self.neighbours,
-            self._order,
-            updates=state.steps,
-        )
+    @property
+    def _list(self) -> NeighbourList:
+        assert self._nearest is not None, "the first call makes the list of neighbours"
+        return self._nearest
 
     def statistics(self, state: State, drag: Drag) -> dict[str, float]:
         """Return the fields of `series`, after the call for this state."""
-        nearest = self._nearest
+        nearest = self._list
         fresh, farthest_alone = changed_neighbours(nearest.index, self._index_before)
         overlaps, below_contact = contacts(
             nearest.vectors(nearest.order), nearest.order, nearest.index
@@ -133,7 +133,7 @@ class NearestNeighbours(Closure):
 
     def memory(self) -> dict[str, np.ndarray]:
         """Return the neighbours of the last step, and the order in which particles lie."""
-        return {"index": self._index, "order": self._nearest.order}
+        return {"index": self._list.index, "order": self._list.order}
 
     def remember(self, memory: Mapping[str, np.ndarray]) -> None:
         """Go on from what `memory` returned."""

@@ -164,7 +164,7 @@ def one_body_operator(body):
 
 def _pair_blocks(bodies, centres) -> dict:
     """The matrix of every ordered pair of bodies."""
-    blocks = {}
+    blocks: dict[tuple[int, int], np.ndarray] = {}
     for i, target in enumerate(bodies):
         for j, source in enumerate(bodies):
             if i != j and (j, i) in blocks and target.symmetric:

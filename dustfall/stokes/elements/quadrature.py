@@ -58,8 +58,8 @@ def touching_pair_rule(shared: int, n: int) -> tuple[np.ndarray, np.ndarray, np.
         ]
     elif shared == 1:
         weight = 4.0 * xi**3 * b
-        x, y = (1, a), (b, b * c)
-        regions = [(x, y, weight), (y, x, weight)]
+        one, other = (1, a), (b, b * c)
+        regions = [(one, other, weight), (other, one, weight)]
     else:
         raise ValueError(f"shared = {shared} vertices: touching triangles share 1, 2 or 3")
 

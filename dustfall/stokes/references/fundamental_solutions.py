@@ -87,10 +87,10 @@ def _rungs(centres, tolerance) -> list[int]:
     """
     n = len(centres)
     interactions = n * (n - 1) * POINTS_PER_FORCE * np.square(LADDER)
-    last = max(np.count_nonzero(interactions <= MOST_INTERACTIONS), 2)
+    last = max(int(np.count_nonzero(interactions <= MOST_INTERACTIONS)), 2)
     distance = cdist(centres, centres)[np.triu_indices(n, 1)].min(initial=np.inf)
     rate = min(2.0 * np.arccosh(distance), 1.0)
-    needed = np.searchsorted(LADDER, (np.log(1.0 / tolerance) / rate) ** 2)
+    needed = int(np.searchsorted(LADDER, (np.log(1.0 / tolerance) / rate) ** 2))
     first = min(max(needed - 1, 0), last - 2)
     return LADDER[first:last]
 
@@ -152,7 +152,7 @@ def solve_with(number: int, centres, flow, goal: float = 1e-13) -> Solution:
     right = sphere.coefficients(uniform).ravel().view(float)
     operator = LinearOperator((len(right), len(right)), matvec=lambda x: x + others(x), dtype=float)
     solution, _ = gmres(operator, right, rtol=goal, restart=MOST_ITERATIONS, maxiter=1)
-    residual = np.linalg.norm(operator @ solution - right) / np.linalg.norm(right)
+    residual = float(np.linalg.norm(operator @ solution - right) / np.linalg.norm(right))
     strengths = sphere.strengths(solution.view(complex).reshape(n, *sphere.shape))
     return Solution(flow, forces + 2.0 * centres[:, None], strengths.reshape(n, -1, 3), residual)
 

@@ -1,0 +1,67 @@
+"""Solving and prediction work where numpy, numba, scipy and safetensors are all there is."""
+
+import json
+import subprocess
+import sys
+from importlib.metadata import distribution
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+PACKAGES = ("numpy", "numba", "llvmlite", "scipy", "safetensors")
+"""What a bare `pip install dustfall` brings; llvmlite comes with numba."""
+
+OTHER_PACKAGES = ("freud", "gmsh", "h5py", "matplotlib", "netCDF4", "pandas", "torch", "xarray")
+
+OTHER_ROOMS = ("dustfall.stokes.elements", "dustfall.training", "dustfall.analysis")
+
+
+@pytest.fixture(scope="module")
+def bare_environment(tmp_path_factory) -> Path:
+    """A folder of links to the library and to its base packages, with their metadata."""
+    folder = tmp_path_factory.mktemp("environment")
+    (folder / "dustfall").symlink_to(ROOT / "dustfall")
+    for name in PACKAGES:
+        found = distribution(name)
+        for top in {Path(file).parts[0] for file in found.files} - {".."}:
+            (folder / top).symlink_to(found.locate_file(top))
+    return folder
+
+
+def run(folder: Path, code: str):
+    """What `code` leaves in `result`, run with the standard library and `folder` alone."""
+    code = f"import json, sys\nsys.path.append({str(folder)!r})\n{code}\nprint(json.dumps(result))"
+    done = subprocess.run(
+        [sys.executable, "-I", "-S", "-c", code], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def test_the_model_that_ships_predicts_in_a_bare_environment(bare_environment):
+    code = """
+from dustfall.forces import load_model
+neighbours = [[[9.0 * (j + 1), 0.0, 0.0] for j in range(5)]]
+result = load_model().predict(neighbours).tolist()"""
+    (force,) = run(bare_environment, code)
+    assert 0.0 < force[1] < 24.0
+
+
+def test_the_solver_solves_in_a_bare_environment(bare_environment):
+    code = """
+from dustfall.stokes import forces_on_fixed_spheres
+result = forces_on_fixed_spheres([[0.0, 0.0, 0.0], [0.0, 1.5, 0.0]]).tolist()"""
+    forces = np.array(run(bare_environment, code))
+    np.testing.assert_allclose(forces[0], forces[1], atol=24.0 * 1e-4)
+
+
+@pytest.mark.parametrize("room", ["forces", "stokes", "suspension.periodic"])
+def test_solving_and_prediction_load_neither_their_tools_nor_other_rooms(room):
+    code = f"import json, sys\nimport dustfall.{room}\nprint(json.dumps(list(sys.modules)))"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    assert not set(json.loads(done.stdout)) & {*OTHER_PACKAGES, *OTHER_ROOMS}
