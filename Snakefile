@@ -1,4 +1,4 @@
-# The campaign: random scenes, boundary-element forces, force models, sedimentation, figures.
+# The campaign: random scenes, their forces, force models, sedimentation, figures.
 # `snakemake -n` shows the plan, `snakemake all` runs it, `snakemake figures` makes the figures,
 # `snakemake exports` writes trajectories for ParaView, `snakemake benchmarks` times the solver,
 # `snakemake studies` compares time steps.
