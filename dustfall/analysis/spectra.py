@@ -19,6 +19,11 @@ from dustfall.analysis.time_averages import ROUNDING
 METHODS = ("periodogram", "welch")
 
 BINS_PER_DECADE = 20
+"""Of an averaged spectrum: narrow beside what a slope is fitted over, wide enough to average."""
+
+HIGHEST_FITTED = 0.25
+"""Highest frequency that a slope is fitted to, in sampling frequencies: half the Nyquist frequency,
+above which aliasing bends the spectrum."""
 
 SHORTEST_SEGMENT = 24
 """Samples of a Welch segment at least: with fewer the window hides what the spectrum is."""
@@ -184,7 +189,7 @@ def phase_and_spectra(
             kappa, energy = energy_spectrum(settling, interval, number, **settings)
             spectrum = averaged_in_bins(kappa, energy)
             per_frequency = 2 * np.pi / (settling.mean() * number)
-            highest = min(fit_frequencies[1], 0.25 / interval)
+            highest = min(fit_frequencies[1], HIGHEST_FITTED / interval)
             limits = (fit_frequencies[0] * per_frequency, highest * per_frequency)
             law = spectral_slope(
                 spectrum["kappa"], spectrum["energy"], spectrum["ordinates"], limits
@@ -232,7 +237,7 @@ def cloud_spectra(
                 frequency, density = power_spectral_density(velocity.T, interval, method=method)
                 kappa = 2 * np.pi * frequency[1:] / speed
                 energy = density[:, 1:] * speed / (2 * np.pi)
-                highest = min(fit_frequencies[1], 0.25 / interval)
+                highest = min(fit_frequencies[1], HIGHEST_FITTED / interval)
                 limits = 2 * np.pi * np.array([fit_frequencies[0], highest]) / speed
                 found = {"method": method} | head
                 tables.append(_with_slope(kappa, energy, slab, limits).assign(**found))

@@ -9,7 +9,6 @@ from matplotlib.ticker import MaxNLocator
 from dustfall.figures.style import (
     COMPONENT_COLOURS,
     DOUBLE,
-    SINGLE,
     letter,
     log_scale,
     model_look,
@@ -265,7 +264,7 @@ def error_by_distance(frame: pd.DataFrame) -> Figure:
     an empty table.
     """
     require(frame, ["model", "gap", "rms_error", "largest_error"], "error_by_distance")
-    figure = new_figure(SINGLE * 1.4, 3.4)
+    figure = new_figure(DOUBLE, 3.4)
     ax = figure.subplots()
     for model, rows in frame.groupby("model", sort=False):
         colour = model_look(model)["color"]
@@ -274,7 +273,7 @@ def error_by_distance(frame: pd.DataFrame) -> Figure:
     log_scale(ax, "xy")
     ax.set_xlabel("gap to the nearest neighbour [$d_p$]")
     ax.set_ylabel(f"error of the force {FORCE_UNIT}")
-    ax.legend(title="line: RMS, dots: largest")
+    figure.legend(title="line: RMS, dots: largest", loc="outside right upper")
     return figure
 
 

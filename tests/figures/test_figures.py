@@ -358,6 +358,23 @@ def test_force_models_stand_in_a_panel_of_their_own_at_the_n_that_they_share():
     assert labels[:2] == [title("idnn"), title("rotne_prager")]
 
 
+def test_only_steady_cases_have_filled_markers_and_a_range_of_others_leaves_the_axis_alone():
+    table = inverse_beta()
+    left, right = figures.inverse_beta(table).axes
+    for ax in (left, right):
+        marked = [line for line in ax.lines if line.get_marker() not in ("None", "*", "_")]
+        filled = [line for line in marked if line.get_markerfacecolor() != "white"]
+        assert {x for line in filled for x in line.get_xdata()} == {1e-3}
+        assert {x for line in marked for x in line.get_xdata()} == set(PHI)
+    assert table["high"].max() == 4
+    assert right.get_ylim()[1] < 1.1 * table["value"].max()
+
+
+def test_the_papers_bounds_have_an_arrow_each_and_its_points_none():
+    ax = figures.inverse_beta(inverse_beta().assign(drift=0.0)).axes[0]
+    assert [tuple(text.xy) for text in ax.texts] == [(1e-3, 1.39)]
+
+
 def test_paths_in_space_keep_their_heights_and_cast_their_shadows_on_the_floor():
     table = trajectories()
     axes = figures.trajectories_3d(table).axes
