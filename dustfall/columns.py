@@ -5,10 +5,13 @@ from collections.abc import Iterable, Mapping
 from os import PathLike
 from typing import NamedTuple
 
-import h5py
 import numpy as np
 
+from dustfall.extras import extra
 from dustfall.files import atomic
+
+with extra("files"):
+    import h5py
 
 
 class Column(NamedTuple):

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+import tomllib
 from importlib.metadata import distribution
 from pathlib import Path
 
@@ -56,6 +57,33 @@ from dustfall.stokes import forces_on_fixed_spheres
 result = forces_on_fixed_spheres([[0.0, 0.0, 0.0], [0.0, 1.5, 0.0]]).tolist()"""
     forces = np.array(run(bare_environment, code))
     np.testing.assert_allclose(forces[0], forces[1], atol=24.0 * 1e-4)
+
+
+ROOMS = {
+    "analysis": "analysis",
+    "benchmarks.solver": "mesh",
+    "sedimentation": "files",
+    "stokes.elements.mesh": "mesh",
+    "training": "train",
+}
+"""Rooms that need more, and the extra that brings the first package that they miss."""
+
+
+def test_a_missing_package_is_named_with_the_extra_that_brings_it(bare_environment):
+    code = f"""
+import importlib
+result = {{}}
+for room in {list(ROOMS)}:
+    try:
+        importlib.import_module("dustfall." + room)
+    except ModuleNotFoundError as error:
+        result[room] = str(error)"""
+    sentences = run(bare_environment, code)
+    for room, extra in ROOMS.items():
+        assert f"not installed; it comes by: pip install 'dustfall[{extra}]'" in sentences[room]
+    with open(ROOT / "pyproject.toml", "rb") as file:
+        extras = tomllib.load(file)["project"]["optional-dependencies"]
+    assert set(ROOMS.values()) <= set(extras)
 
 
 @pytest.mark.parametrize("room", ["forces", "stokes", "suspension.periodic"])

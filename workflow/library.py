@@ -8,7 +8,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 
-WITHOUT_RESULTS = {"dustfall/files.py", "dustfall/progress.py"}
+WITHOUT_RESULTS = {"dustfall/extras.py", "dustfall/files.py", "dustfall/progress.py"}
 """They decide how a file is put in place and what a terminal shows, not what a result is."""
 
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 
-import freud
 import numpy as np
 import pandas as pd
 import xarray as xr
@@ -16,9 +15,13 @@ from dustfall.analysis.references import (
 )
 from dustfall.analysis.settling import CASE, STEADY, case_of, from_time
 from dustfall.analysis.time_averages import correlation_length
+from dustfall.extras import extra
 from dustfall.sedimentation.start import random_positions
 from dustfall.sedimentation.state import box_length
 from dustfall.streams import Purpose, stream
+
+with extra("analysis"):
+    import freud
 
 VOLUME_EDGES = np.linspace(0, 4, 41)
 """Bins of V/mean(V); of a Poisson process fewer than one cell in 10^5 is larger."""

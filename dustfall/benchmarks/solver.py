@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-import pandas as pd
-from pygrpy.grpy_tensors import muTT
 
+from dustfall.extras import extra
 from dustfall.spheres import flow_direction
 from dustfall.stokes.elements.boundary_elements import forces_by_elements
 from dustfall.stokes.elements.mesh import sphere_mesh
@@ -17,6 +16,10 @@ from dustfall.stokes.references.fundamental_solutions import reference_forces
 from dustfall.stokes.references.multiblob import multiblob_forces
 from dustfall.stokes.solve import fixed_spheres
 from dustfall.units import STOKES_DRAG
+
+with extra("benchmarks"):
+    import pandas as pd
+    from pygrpy.grpy_tensors import muTT
 
 EXACT = 1e-8
 """Tolerance of the solve that errors are measured against."""

@@ -4,12 +4,15 @@ import os
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
-import netCDF4
 import numpy as np
 
 from dustfall import __version__
 from dustfall.columns import Column
+from dustfall.extras import extra
 from dustfall.files import atomic
+
+with extra("files"):
+    import netCDF4
 
 TRACKED = 3
 """Particles whose position, velocity and force the series holds at every step."""

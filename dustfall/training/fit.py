@@ -6,16 +6,19 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 
 import numpy as np
-import torch
-from torch import nn
 
 from dustfall import __version__
+from dustfall.extras import extra
 from dustfall.forces.features import KINDS, RADIAL_INPUTS, Scenes, block_inputs, describe
 from dustfall.forces.frames import check_neighbours
 from dustfall.forces.learned import FORMAT, VERSION, LearnedModel, Network, parse_layers
 from dustfall.streams import Purpose, sequence, stream
 from dustfall.training.networks import Affine, build
 from dustfall.units import COMPONENTS
+
+with extra("train"):
+    import torch
+    from torch import nn
 
 VALIDATION_SHARE = 0.1
 """Share of the samples kept for validation (paper, section "Deterministic model")."""

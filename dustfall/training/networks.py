@@ -6,11 +6,14 @@ Side by side they train in half the time: small networks wait for the calls, not
 from itertools import pairwise
 
 import numpy as np
-import torch
-from torch import nn
 
+from dustfall.extras import extra
 from dustfall.forces.features import KINDS, block_inputs
 from dustfall.forces.learned import ACTIVATION, block_widths
+
+with extra("train"):
+    import torch
+    from torch import nn
 
 
 class Affine(nn.Module):

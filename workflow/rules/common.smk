@@ -2,7 +2,7 @@
 
 
 wildcard_constraints:
-    law="uniform|ball|contact",
+    law="|".join(config["scenes"]["number"]),
     shard=r"\d+",
     component="streamwise|lateral",
     model="[a-z_]+",

@@ -3,8 +3,12 @@
 from dataclasses import dataclass
 from functools import cached_property
 
-import gmsh
 import numpy as np
+
+from dustfall.extras import extra
+
+with extra("mesh"):
+    import gmsh
 
 LARGEST_SIZE = 1.5
 """Longest edges [radii] that still make a closed, convex mesh."""
