@@ -47,17 +47,28 @@ def missing_velocity(degree, xi):
     terms = degree + 1.0
     apart = np.exp(min(xi * (terms + 1.0), 600.0))
     near = terms**4 * np.exp(min(0.2 * xi * terms, 600.0))
-    return 0.5 / (apart + near)
+    return 1.1 / (apart + near)
 
 
 @njit(cache=True)
-def squeezed(terms, xi, gap):
-    """Force on a sphere by an incoming velocity of degree `terms`, at most, next to a fixed one.
+def pushed(terms, xi, gap):
+    """Force on a sphere by a velocity of degree `terms` coming in on another, fixed one, at most.
 
-    The velocity is that of an approach in part, and lubrication makes the force of an approach grow
-    as 1 / gap (Jeffrey and Onishi 1984: X11A).
+    Near contact the velocity is that of an approach in part, and lubrication makes the force of an
+    approach grow as 1 / gap (Jeffrey and Onishi 1984: X11A).
     """
-    return 0.5 / gap * (1.0 + terms * xi) * np.exp(-min(terms * xi, 600.0))
+    return _push(xi, gap) * (1.0 + terms * min(xi, 2.6)) * np.exp(-min(terms * xi, 600.0))
+
+
+@njit(cache=True)
+def _push(xi, gap):
+    return (0.225 + 0.275 * min(0.5 * xi, 1.0)) / gap
+
+
+@njit(cache=True)
+def echo(distance):
+    """Force by a velocity on the sphere itself, which the other sends back, over `pushed`."""
+    return min(1.25 / distance, 1.0)
 
 
 @njit(cache=True)
@@ -98,65 +109,68 @@ def strain(distance):
 
 @njit(cache=True)
 def _sums(distance, xi, sources, highest):
-    """What spheres answer together: three sums over all others j of a sphere i.
+    """What spheres answer together: sums over all others j of a sphere i.
 
-    sources: (n, n), strength of j as i sees it, at most 1. Returns forces and tractions (n, highest
-    + 2), column t: `squeezed` at degree t, and the traction of degree t that the sources leave; and
-    the strain (n,) of the sources' flow.
+    sources: (n, n), strength of j as i sees it, at most 1. Returns three arrays (n, highest + 2),
+    column t: `pushed` at degree t, its echoes, and the traction of degree t that the sources leave;
+    and the strain (n,) of the sources' flow.
     """
     n = len(xi)
-    forces, tractions = np.zeros((n, highest + 2)), np.zeros((n, highest + 2))
+    shape = (n, highest + 2)
+    pushes, echoes, tractions = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     strains = np.zeros(n)
     for i in range(n):
         for j in range(n):
             if j != i:
-                fade, power = np.exp(-xi[i, j]), 0.5 / (distance[i, j] - 1.0)
+                d, slope = distance[i, j], min(xi[i, j], 2.6)
+                fade, power, back = np.exp(-xi[i, j]), _push(xi[i, j], d - 1.0), echo(d)
                 for t in range(1, highest + 2):
                     power *= fade
-                    force = power * (1.0 + t * xi[i, j])
-                    forces[i, t] += force
-                    tractions[i, t] += sources[i, j] * min(force, held(t))
-                strains[i] += sources[i, j] * strain(distance[i, j])
-    return forces, tractions, strains
+                    push = power * (1.0 + t * slope)
+                    pushes[i, t] += push
+                    echoes[i, t] += back * push
+                    tractions[i, t] += sources[i, j] * min(push, held(t))
+                strains[i] += sources[i, j] * strain(d)
+    return pushes, echoes, tractions, strains
 
 
 @njit(cache=True)
 def _left_out(distance, xi, sources, sums, degrees):
     """Error (n,) of each sphere's own force by the degrees that pairs do not exchange.
 
-    Degree t = degrees[i, j] + 1 is the first that j's field lacks on i. It would push i against
-    what is next to i, and whatever is next to i against i; and j's own traction of that degree,
-    which all others make, does not reach i. All are added, as they may add.
+    Degree t = degrees[i, j] + 1 is the first that j's field lacks on i. It would push whatever is
+    next to i, and i itself by its echo; and j's own traction of that degree, which all others make,
+    does not reach i. All are added, as they may add.
     """
-    forces, tractions, strains = sums
-    n, columns = forces.shape
+    _, echoes, tractions, strains = sums
+    n, columns = echoes.shape
     out, missing, highest = np.zeros(n), np.zeros((n, columns)), 1
     for i in range(n):
         for j in range(n):
             if j != i:
-                degree = degrees[i, j]
+                degree, d = degrees[i, j], distance[i, j]
                 t = degree + 1
                 highest = max(highest, t)
                 velocity = missing_velocity(degree, xi[i, j])
-                force = squeezed(t, xi[i, j], distance[i, j] - 1.0)
+                push = pushed(t, xi[i, j], d - 1.0)
                 source = sources[i, j]
                 missing[i, t] += source * velocity
-                own = source * strain(distance[i, j])
-                around = max(max(strains[i], strains[j]) - own, 0.0)
+                around = max(max(strains[i], strains[j]) - source * strain(d), 0.0)
                 out[i] += sources[j, i] * uniform_error(degree, xi[i, j])
                 out[i] += around * strained_error(degree, xi[i, j])
-                out[i] += source * velocity * max(forces[i, t] - force, 0.0)
-                traction = tractions[j, t] - sources[j, i] * min(force, held(t))
+                out[i] += source * velocity * max(echoes[i, t] - echo(d) * push, 0.0)
+                traction = tractions[j, t] - sources[j, i] * min(push, held(t))
                 out[i] += velocity * max(traction, 0.0)
-                # Taken back below, where i is what is next to j.
-                out[i] -= sources[j, i] * velocity * force
+                # Taken back below, where i itself is the source that pushes it.
+                out[i] -= sources[j, i] * velocity * push
     for i in range(n):
         for j in range(n):
             if j != i:
-                fade, power = np.exp(-xi[i, j]), 0.5 / (distance[i, j] - 1.0)
+                slope = min(xi[i, j], 2.6)
+                fade, power = np.exp(-xi[i, j]), _push(xi[i, j], distance[i, j] - 1.0)
                 for t in range(1, highest + 1):
                     power *= fade
-                    out[i] += missing[j, t] * power * (1.0 + t * xi[i, j])
+                    out[i] += missing[j, t] * power * (1.0 + t * slope)
     return np.maximum(out, 0.0)
 
 
@@ -220,7 +234,7 @@ def _choose_degrees(distance, tolerance, most):
     xi = np.arccosh(distance)
     sources = np.ones((n, n))
     sums = _sums(distance, xi, sources, most)
-    forces, tractions, strains = sums
+    pushes, _, tractions, strains = sums
     screen = np.zeros(n)
     for i in range(n):
         for j in range(n):
@@ -236,8 +250,8 @@ def _choose_degrees(distance, tolerance, most):
                 degree = degrees[i, j]
                 while degree < most:
                     t = degree + 1
-                    own = squeezed(t, xi[i, j], distance[i, j] - 1.0)
-                    others = max(forces[i, t], forces[j, t]) - own
+                    own = pushed(t, xi[i, j], distance[i, j] - 1.0)
+                    others = max(pushes[i, t], pushes[j, t]) - own
                     others += max(tractions[i, t], tractions[j, t]) - min(own, held(t))
                     left = missing_velocity(degree, xi[i, j]) * max(others, 0.0)
                     left += uniform_error(degree, xi[i, j])
