@@ -105,14 +105,14 @@ def couple_scene(centres, degrees, tables):
     for i in range(n):
         for j in range(i):
             apart = centres[i] - centres[j]
-            own = slice(begin[p, 1], begin[p + 1, 1])
-            if degrees[i, j] == 0:
-                couplings[own] = coupling_of_forces(apart).ravel()
+            degree = degrees[i, j]
+            if degree == 0:
+                coupling = coupling_of_forces(apart).ravel()
             else:
                 distance = np.sqrt(np.sum(apart**2))
-                turn = turns_to(degrees[i, j], apart / distance)
-                turns[begin[p, 0] : begin[p + 1, 0]] = turn.ravel()
-                couplings[own] = axial_coupling(degrees[i, j], distance, tables)
+                turns[begin[p, 0] : begin[p + 1, 0]] = turns_to(degree, apart / distance).ravel()
+                coupling = axial_coupling(degree, distance, tables)
+            couplings[begin[p, 1] : begin[p + 1, 1]] = coupling
             p += 1
     return highest, starts, turns, couplings, begin
 
@@ -140,8 +140,8 @@ def apply_system(moments, scene, degrees, response, tables, out):
             p += 1
     out[:] = moments
     for i in range(len(highest)):
-        own = slice(starts[i], starts[i + 1])
-        _respond(highest[i], response, incoming[own], out[own])
+        u, q = incoming[starts[i] : starts[i + 1]], out[starts[i] : starts[i + 1]]
+        _respond(highest[i], response, u, q)
 
 
 @njit(cache=True)
@@ -158,8 +158,8 @@ def solve_scene(centres, flow, degrees, response, tables, tolerance, most):
     uniform, right = np.zeros((starts[n], 3)), np.zeros((starts[n], 3))
     for i in range(n):
         uniform[starts[i]] = np.sqrt(4.0 * np.pi) * flow
-        own = slice(starts[i], starts[i + 1])
-        _respond(highest[i], response, uniform[own], right[own])
+        u, q = uniform[starts[i] : starts[i + 1]], right[starts[i] : starts[i + 1]]
+        _respond(highest[i], response, u, q)
     iterations, residual = 0, 0.0
     solution = right
     if n > 1:

@@ -113,26 +113,6 @@ def coupling_of_forces(apart):
 
 
 @njit(cache=True)
-def _gradient(step, m, solid, gradient, out):
-    """Coefficients of order m + step of d_step applied to regular solid harmonics of order m."""
-    out[:] = 0.0
-    for l in range(max(abs(m), 1), len(solid)):  # noqa: E741
-        out[l - 1] = gradient[step, m + 2, l] * solid[l]
-
-
-@njit(cache=True)
-def _times(step, m, values, up, down, out):
-    """Coefficients of order m + step of x_step times harmonics of order m on the unit sphere."""
-    out[:] = 0.0
-    for l in range(abs(m), len(values)):  # noqa: E741
-        if values[l] != 0.0:
-            if l + 1 < len(values):
-                out[l + 1] += up[step, m + 2, l] * values[l]
-            if l > 0:
-                out[l - 1] += down[step, m + 2, l] * values[l]
-
-
-@njit(cache=True)
 def axial_coupling(degree, distance, tables):
     """Matrices of the numbers M = 0, 1, ... of a pair along z, row by row one after the other.
 
@@ -140,15 +120,14 @@ def axial_coupling(degree, distance, tables):
     """
     moved, gradient, up, down, _, _, _ = tables
     sizes, entries = block_sizes(degree)
-    out = np.zeros(entries)
+    out = np.empty(entries)
     length = degree + 3
-    powers = np.empty(2 * length + 1)
+    powers = np.empty(2 * length)
     powers[0] = 1.0
-    for t in range(2 * length):
+    for t in range(2 * length - 1):
         powers[t + 1] = powers[t] / distance
-    one, source = np.empty(length), np.empty(length)
-    phi, psi = np.empty(length), np.empty(length)
-    slope, product, velocity = np.empty(length), np.empty(length), np.empty((3, length))
+    # Of the column's traction: potentials of its component and of y.f, and d_r of the former.
+    phi, psi, slope = np.empty(length), np.empty(length), np.zeros(length)
     begin = 0
     for total in range(degree + 2):
         size = sizes[total]
@@ -157,32 +136,33 @@ def axial_coupling(degree, distance, tables):
             m = total + _COMPONENTS[s]
             # a.b = a_z b_z + (a_+ b_- + a_- b_+) in the scaled components: the partner of s.
             partner = (3 - s) % 3
+            scale = 1.0 if s == 0 else np.sqrt(0.5)
             for l in range(abs(m), degree + 1):  # noqa: E741
-                one[:] = 0.0
-                one[l] = 1.0
-                _times(partner, m, one, up, down, source)
-                scale = 1.0 if s == 0 else np.sqrt(0.5)
+                above = scale * up[partner, m + 2, l]
+                below = scale * down[partner, m + 2, l] if l > 0 else 0.0
                 for t in range(length):
                     phi[t] = moved[abs(m), t, l] * powers[l + t + 1]
-                    psi[t] = moved[total, t, l + 1] * powers[l + t + 2] * source[l + 1]
+                    psi[t] = above * moved[total, t, l + 1] * powers[l + t + 2]
                     if l > 0:
-                        psi[t] += moved[total, t, l - 1] * powers[l + t] * source[l - 1]
-                    psi[t] *= scale
-                velocity[:] = 0.0
-                velocity[s] = phi
-                for r in range(3):
-                    weight = 1.0 if r == 0 else np.sqrt(0.5)
-                    _gradient(r, m, phi, gradient, slope)
-                    _times(partner, m + _COMPONENTS[r], slope, up, down, product)
-                    velocity[r] -= weight * scale * product
-                    if s == 0:
-                        velocity[r] -= weight * distance * slope
-                    _gradient(r, total, psi, gradient, slope)
-                    velocity[r] += weight * slope
+                        psi[t] += below * moved[total, t, l - 1] * powers[l + t]
                 row = 0
                 for r in range(3):
-                    for t in range(abs(total + _COMPONENTS[r]), degree + 1):
-                        out[begin + row * size + column] = velocity[r, t] / (8.0 * np.pi)
+                    weight = 1.0 if r == 0 else np.sqrt(0.5)
+                    order = total + _COMPONENTS[r]
+                    mixed = m + _COMPONENTS[r]
+                    for t in range(length - 1):
+                        slope[t] = gradient[r, m + 2, t + 1] * phi[t + 1]
+                    for t in range(abs(order), degree + 1):
+                        times = down[partner, mixed + 2, t + 1] * slope[t + 1]
+                        if t > 0:
+                            times += up[partner, mixed + 2, t - 1] * slope[t - 1]
+                        value = gradient[r, total + 2, t + 1] * psi[t + 1] - scale * times
+                        if s == 0:
+                            value -= distance * slope[t]
+                        value *= weight
+                        if r == s:
+                            value += phi[t]
+                        out[begin + row * size + column] = value / (8.0 * np.pi)
                         row += 1
                 column += 1
         begin += size * size
