@@ -10,6 +10,10 @@ from dustfall.stokes.translation import MOST_DEGREE
 
 SMALLEST_TOLERANCE, LARGEST_TOLERANCE = 1e-8, 0.1
 
+NEGLIGIBLE = 1e-16
+"""Fields below this are left out of the bound: a million of them are 1e-2 of the smallest
+tolerance."""
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -87,7 +91,7 @@ def uniform_error(degree, xi):
     Far apart 4 / s^4, s in radii, at degree 0 (the next reflection; Happel and Brenner 1983).
     """
     terms = degree + 1.0
-    apart = np.exp(min(2.0 * (terms + 1.0) * np.log(2.0 * np.cosh(xi)), 600.0)) / (4.0 * terms)
+    apart = np.exp(min(2.0 * xi * (terms + 1.0), 600.0)) / (4.0 * terms)
     near = terms**6 / 2.6 * np.exp(min(0.5 * xi * terms, 600.0))
     return 1.0 / (apart + near)
 
@@ -126,6 +130,8 @@ def _sums(distance, xi, sources, highest):
                 fade, power, back = np.exp(-xi[i, j]), _push(xi[i, j], d - 1.0), echo(d)
                 for t in range(1, highest + 2):
                     power *= fade
+                    if power < NEGLIGIBLE:
+                        break
                     push = power * (1.0 + t * slope)
                     pushes[i, t] += push
                     echoes[i, t] += back * push
@@ -170,6 +176,8 @@ def _left_out(distance, xi, sources, sums, degrees):
                 fade, power = np.exp(-xi[i, j]), _push(xi[i, j], distance[i, j] - 1.0)
                 for t in range(1, highest + 1):
                     power *= fade
+                    if power < NEGLIGIBLE:
+                        break
                     out[i] += missing[j, t] * power * (1.0 + t * slope)
     return np.maximum(out, 0.0)
 
@@ -241,26 +249,24 @@ def _choose_degrees(distance, tolerance, most):
             if j != i:
                 screen[i] += 0.5 / distance[i, j]
     screen = 1.0 / (1.0 + screen)
-    share = tolerance
+    share, left = tolerance, np.full((n, n), np.inf)
     while True:
         complete = True
         for i in range(n):
             for j in range(i):
-                around = max(max(strains[i], strains[j]) - strain(distance[i, j]), 0.0)
-                degree = degrees[i, j]
-                while degree < most:
+                # The next degree while what this pair alone leaves out exceeds its share.
+                while left[i, j] > share and degrees[i, j] < most:
+                    degree = degrees[i, j] + (0 if left[i, j] == np.inf else 1)
                     t = degree + 1
                     own = pushed(t, xi[i, j], distance[i, j] - 1.0)
                     others = max(pushes[i, t], pushes[j, t]) - own
                     others += max(tractions[i, t], tractions[j, t]) - min(own, held(t))
-                    left = missing_velocity(degree, xi[i, j]) * max(others, 0.0)
-                    left += uniform_error(degree, xi[i, j])
-                    left += around * strained_error(degree, xi[i, j])
-                    if left <= share:
-                        break
-                    degree += 1
-                degrees[i, j] = degrees[j, i] = degree
-                complete &= degree == most
+                    around = max(max(strains[i], strains[j]) - strain(distance[i, j]), 0.0)
+                    left[i, j] = missing_velocity(degree, xi[i, j]) * max(others, 0.0)
+                    left[i, j] += uniform_error(degree, xi[i, j])
+                    left[i, j] += around * strained_error(degree, xi[i, j])
+                    degrees[i, j] = degrees[j, i] = degree
+                complete &= degrees[i, j] == most
         own = _left_out(distance, xi, sources, sums, degrees)
         error = np.max(_felt_by_others(distance, own, screen))
         if error <= 0.9 * tolerance or complete or share < 1e-6 * tolerance:
