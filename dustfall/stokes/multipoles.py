@@ -15,8 +15,8 @@ from dustfall.stokes.translation import (
     axial_coupling,
     block_size,
     block_sizes,
-    coupling_of_forces,
     gather_azimuthal,
+    put_coupling_of_forces,
     scatter_azimuthal,
     turn_from_axis,
     turn_to_axis,
@@ -25,12 +25,13 @@ from dustfall.stokes.translation import (
 
 
 @njit(cache=True)
-def _add_forces(coupling, q_i, q_j, u_i, u_j):
-    """`_add_pair` for degree 0 alone."""
+def _add_forces(coupling, begin, moments, i, j, incoming):
+    """`_add_pair` for degree 0 alone: rows i and j of moments and incoming, (total, 3)."""
     for a in range(3):
         for b in range(3):
-            u_i[0, a] += coupling[3 * a + b] * q_j[0, b]
-            u_j[0, a] += coupling[3 * a + b] * q_i[0, b]
+            v = coupling[begin + 3 * a + b]
+            incoming[i, a] += v * moments[j, b]
+            incoming[j, a] += v * moments[i, b]
 
 
 @njit(cache=True)
@@ -104,15 +105,15 @@ def couple_scene(centres, degrees, tables):
     turns, couplings, p = np.empty(begin[count, 0]), np.empty(begin[count, 1]), 0
     for i in range(n):
         for j in range(i):
-            apart = centres[i] - centres[j]
             degree = degrees[i, j]
+            coupling = couplings[begin[p, 1] : begin[p + 1, 1]]
             if degree == 0:
-                coupling = coupling_of_forces(apart).ravel()
+                put_coupling_of_forces(centres[i], centres[j], coupling)
             else:
+                apart = centres[i] - centres[j]
                 distance = np.sqrt(np.sum(apart**2))
                 turns[begin[p, 0] : begin[p + 1, 0]] = turns_to(degree, apart / distance).ravel()
-                coupling = axial_coupling(degree, distance, tables)
-            couplings[begin[p, 1] : begin[p + 1, 1]] = coupling
+                coupling[:] = axial_coupling(degree, distance, tables)
             p += 1
     return highest, starts, turns, couplings, begin
 
@@ -127,16 +128,25 @@ def apply_system(moments, scene, degrees, response, tables, out):
     lines = np.empty((4, 3 * largest, 2))
     p = 0
     for i in range(len(highest)):
-        q_i, u_i = moments[starts[i] : starts[i + 1]], incoming[starts[i] : starts[i + 1]]
         for j in range(i):
-            q_j, u_j = moments[starts[j] : starts[j + 1]], incoming[starts[j] : starts[j + 1]]
-            coupling = couplings[begin[p, 1] : begin[p + 1, 1]]
             degree = degrees[i, j]
             if degree == 0:
-                _add_forces(coupling, q_i, q_j, u_i, u_j)
+                _add_forces(couplings, begin[p, 1], moments, starts[i], starts[j], incoming)
             else:
-                turn = turns[begin[p, 0] : begin[p + 1, 0]].reshape(4, degree + 2)
-                _add_pair(degree, turn, coupling, tables, q_i, q_j, u_i, u_j, field, spare, lines)
+                own, other = (starts[i], starts[i + 1]), (starts[j], starts[j + 1])
+                _add_pair(
+                    degree,
+                    turns[begin[p, 0] : begin[p + 1, 0]].reshape(4, degree + 2),
+                    couplings[begin[p, 1] : begin[p + 1, 1]],
+                    tables,
+                    moments[own[0] : own[1]],
+                    moments[other[0] : other[1]],
+                    incoming[own[0] : own[1]],
+                    incoming[other[0] : other[1]],
+                    field,
+                    spare,
+                    lines,
+                )
             p += 1
     out[:] = moments
     for i in range(len(highest)):

@@ -208,8 +208,10 @@ def _sources(centres, distance, force):
         for j in range(n):
             if j != i:
                 d = distance[i, j]
-                along = np.sum(force[j] * (centres[i] - centres[j])) / d
-                square = np.sum(force[j] ** 2)
+                along = square = 0.0
+                for k in range(3):
+                    along += force[j, k] * (centres[i, k] - centres[j, k]) / d
+                    square += force[j, k] ** 2
                 weaker = min(0.45 + 0.75 / d, 1.0)
                 out[i, j] = np.sqrt(along**2 + weaker**2 * max(square - along**2, 0.0))
     return out

@@ -98,18 +98,24 @@ def block_sizes(degree):
 
 
 @njit(cache=True)
-def coupling_of_forces(apart):
-    """Coupling (3, 3) of the moments of degree 0 of two spheres `apart` (3,) [radii].
+def put_coupling_of_forces(centre, other, out):
+    """Write the coupling of the moments of degree 0 of two spheres, row by row: out (9,).
 
-    The Rotne-Prager tensor, which is exact for uniform tractions (Rotne and Prager 1969), times
-    4 pi, since moments and velocities of degree 0 are over and times the root of that.
+    centre, other: (3,) [radii]. The Rotne-Prager tensor, which is exact for uniform tractions
+    (Rotne and Prager 1969), times 4 pi, since moments and velocities of degree 0 are over and
+    times the root of that.
     """
-    square = np.sum(apart**2)
-    distance = np.sqrt(square)
-    out = np.outer(apart, apart) * ((1.0 - 2.0 / square) / square)
+    square = 0.0
     for i in range(3):
-        out[i, i] += 1.0 + 2.0 / (3.0 * square)
-    return out / (2.0 * distance)
+        square += (centre[i] - other[i]) ** 2
+    distance = np.sqrt(square)
+    along = (1.0 - 2.0 / square) / square
+    for i in range(3):
+        for j in range(3):
+            value = along * (centre[i] - other[i]) * (centre[j] - other[j])
+            if i == j:
+                value += 1.0 + 2.0 / (3.0 * square)
+            out[3 * i + j] = value / (2.0 * distance)
 
 
 @njit(cache=True)
