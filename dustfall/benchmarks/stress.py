@@ -1,22 +1,24 @@
 """Stress tests of the solver's numerical stability: each returns a table of what it measured."""
 
 import time
+from functools import cache
 
 import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
-from dustfall.spheres import flow_direction
+from dustfall.spheres import centre_distances, flow_direction
 from dustfall.stokes.elements.mesh import SphereMesh, sphere_mesh
 from dustfall.stokes.elements.one_body import OneBody
 from dustfall.stokes.elements.single_layer import nodal_integrals, self_interaction
 from dustfall.stokes.harmonics import exact_response
 from dustfall.stokes.multipoles import apply_system, couple_scene, solve_scene
-from dustfall.stokes.plan import plan_scene
+from dustfall.stokes.plan import SMALLEST_TOLERANCE, plan_scene
 from dustfall.stokes.references.exact_pairs import forces_on_two_spheres
 from dustfall.stokes.solve import fixed_spheres, response_rows, solve
 from dustfall.stokes.translation import translation_tables
-from dustfall.units import FORCE_UNIT, RADIUS, STOKES_DRAG
+from dustfall.streams import Purpose, stream
+from dustfall.units import CONTACT, FORCE_UNIT, RADIUS, STOKES_DRAG
 
 FLOW = np.array([0.36, 0.8, 0.48])
 """Unit flow in no special direction of the clusters."""
@@ -28,6 +30,16 @@ CLUSTERS = {
     "six": np.array([[0, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]]),
 }
 """Centres [d_p] of clusters that touch; times 1 + gap they are that far apart."""
+
+LURES = ((1e-2, 325.0), (1e-3, 910.0), (1e-4, 100.0), (3e-3, 25.0))
+"""Gaps of a pair and distances [d_p] of spheres that squeeze it where their gradient is cut off: a
+bound without lubrication is 8 to 71 tolerances off there."""
+
+NEAR = 0.05
+"""Gap [d_p] below which the finest degrees stand for all in `crowds`."""
+
+_FACING = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
+"""Turns the line of a cluster from z to y."""
 
 FINE_DEGREE = 72
 """Degree of all pairs in the solve that clusters of more than two spheres are measured against."""
@@ -55,6 +67,68 @@ def gaps(tolerances, sizes=(1.0, 0.1, 1e-2, 1e-3, 1e-4), progress=None):
                 if progress is not None:
                     progress(len(rows), len(CLUSTERS) * len(sizes) * len(tolerances))
     return pd.DataFrame(rows)
+
+
+def crowds(tolerances, progress=None) -> pd.DataFrame:
+    """What could fool the error estimate: columns as in `gaps`, value the smallest gap [d_p].
+
+    Nearly touching pairs and triples among far spheres that strain the flow at them, lattices, a
+    chain, two clusters apart and a compact one; each against a solve with more degrees.
+    """
+    rows, scenes = [], list(_crowds())
+    for name, centres in scenes:
+        exact = fine_forces(centres, FLOW, _fine_degrees(centres))
+        gap = centre_distances(centres).min() - CONTACT
+        for tolerance in tolerances:
+            row = {"test": "crowd", "case": name, "value": gap}
+            rows.append(row | _solved(centres, exact, tolerance))
+            if progress is not None:
+                progress(len(rows), len(scenes) * len(tolerances))
+    return pd.DataFrame(rows)
+
+
+def _crowds():
+    """Names and centres (n, 3) [d_p] of the scenes of `crowds`."""
+    for gap, distance in LURES:
+        near = (CONTACT + gap) * CLUSTERS["pair"] @ _FACING
+        yield "pair and a square far off", np.vstack([near, _square(distance)])
+    for item, (number, distance) in enumerate(((1, 5.0), (4, 20.0), (24, 60.0))):
+        rng = stream(Purpose.STRESS, 1, len(CLUSTERS), item)
+        for name in ("pair", "chain of three"):
+            near = 1.003 * CLUSTERS[name] @ _FACING
+            yield f"{name} among {number} far", np.vstack([near, _ring(number, distance, rng)])
+    for side, spacing in ((3, 1.5), (5, 60.0)):
+        axis = spacing * np.arange(side)
+        yield f"lattice of {side**3}", np.array(np.meshgrid(axis, axis, axis)).reshape(3, -1).T
+    yield "chain of 20", 1.1 * np.arange(20.0)[:, None] * [0.0, 1.0, 0.0]
+    six = 1.05 * CLUSTERS["six"]
+    yield "two clusters apart", np.vstack([six, six + np.array([3.0, 12.0, 4.0])])
+    # A sphere and its twelve neighbours in the closest packing.
+    twelve = [np.roll([0.0, a, b], k) for a in (-1, 1) for b in (-1, 1) for k in range(3)]
+    yield "thirteen", 1.02 * np.vstack([np.zeros((1, 3)), np.sqrt(0.5) * np.array(twelve)])
+
+
+def _square(distance: float) -> np.ndarray:
+    """4 x 4 spheres on a square, a tenth of `distance` apart, across the line to the origin."""
+    x, z = 0.1 * distance * (np.mgrid[:4, :4].reshape(2, -1) - 1.5)
+    return np.column_stack([x, np.full(16, distance), z])
+
+
+def _ring(number: int, distance: float, rng) -> np.ndarray:
+    """Random spheres, `distance` to twice that far from the origin, 2 d_p from one another."""
+    placed = np.empty((0, 3))
+    while len(placed) < number:
+        place = distance * rng.uniform(1.0, 2.0) * Rotation.random(rng=rng).as_matrix()[0]
+        if (np.linalg.norm(placed - place, axis=1) > 2.0).all():
+            placed = np.vstack([placed, place])
+    return placed
+
+
+def _fine_degrees(centres) -> np.ndarray:
+    """Degrees beyond those of the strictest tolerance; the highest for nearly touching pairs."""
+    degrees = np.minimum(plan_scene(centres, SMALLEST_TOLERANCE).degrees + 4, FINE_DEGREE)
+    degrees[centre_distances(centres) < CONTACT + NEAR] = FINE_DEGREE
+    return degrees
 
 
 def distances(tolerances, values=(10.0, 100.0, 1e3, 1e4)) -> pd.DataFrame:
@@ -131,15 +205,25 @@ def condition_numbers(edges=(1.0, 0.7, 0.5, 0.35), sizes=(1.0, 0.1, 1e-2, 1e-3),
     )
 
 
-def fine_forces(centres, flow, degree: int) -> np.ndarray:
-    """Forces (n, 3) [Re_p c_D] with all degrees up to `degree` on every sphere, no tolerance."""
-    degrees = np.full((len(centres), len(centres)), degree)
+def fine_forces(centres, flow, degrees) -> np.ndarray:
+    """Forces (n, 3) [Re_p c_D] with the degrees that are asked for, no tolerance.
+
+    degrees: one for all pairs, or (n, n), symmetric.
+    """
+    n = len(centres)
+    degrees = np.array(np.broadcast_to(degrees, (n, n)))
     np.fill_diagonal(degrees, 0)
-    response, tables = response_rows(exact_response(degree)), translation_tables(degree)
+    highest = int(degrees.max())
+    response, tables = _fine_tables(highest)
     force, _, _ = solve_scene(
-        np.asarray(centres) / RADIUS, flow_direction(flow), degrees, response, tables, 1e-11, 600
+        np.asarray(centres) / RADIUS, flow_direction(flow), degrees, response, tables, 1e-12, 600
     )
     return FORCE_UNIT * RADIUS * force
+
+
+@cache
+def _fine_tables(degree):
+    return response_rows(exact_response(degree)), translation_tables(degree)
 
 
 def _solved(centres, exact, tolerance) -> dict:

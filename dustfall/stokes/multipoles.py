@@ -13,25 +13,41 @@ from numba import njit
 from dustfall.stokes.gmres import combined, extended, started
 from dustfall.stokes.translation import (
     axial_coupling,
+    block_size,
     block_sizes,
     gather_azimuthal,
+    put_coupling_of_forces,
     scatter_azimuthal,
     turn_from_axis,
     turn_to_axis,
+    turns_to,
 )
 
 
 @njit(cache=True)
-def _add_pair(degree, polar, azimuth, coupling, tables, q_i, q_j, u_i, u_j, field, spare, lines):
+def _add_forces(coupling, begin, moments, i, j, incoming):
+    """`_add_pair` for degree 0 alone: rows i and j of moments and incoming, (total, 3)."""
+    for a in range(3):
+        for b in range(3):
+            v = coupling[begin + 3 * a + b]
+            incoming[i, a] += v * moments[j, b]
+            incoming[j, a] += v * moments[i, b]
+
+
+@njit(cache=True)
+def _add_pair(degree, turns, coupling, tables, q_i, q_j, u_i, u_j, field, spare, lines):
     """Add to u_i, u_j the velocity that the traction of either sphere makes on the other."""
     k = (degree + 1) ** 2
     for source, line in ((q_i, lines[0]), (q_j, lines[1])):
         field[:k] = source[:k]
-        turn_to_axis(degree, polar, azimuth, tables, field, spare)
+        turn_to_axis(degree, turns, tables, field, spare)
         gather_azimuthal(degree, field, line)
     from_i, from_j, at_i, at_j = lines
     begin = first = 0
-    for size in block_sizes(degree):
+    for total in range(degree + 2):
+        size = block_size(degree, total)
+        # The coupling seen from j is the transpose.
+        at_j[first : first + size] = 0.0
         for row in range(size):
             a, b = 0.0, 0.0
             x, y = from_i[first + row, 0], from_i[first + row, 1]
@@ -39,20 +55,14 @@ def _add_pair(degree, polar, azimuth, coupling, tables, q_i, q_j, u_i, u_j, fiel
                 v = coupling[begin + row * size + column]
                 a += v * from_j[first + column, 0]
                 b += v * from_j[first + column, 1]
-            at_i[first + row, 0], at_i[first + row, 1] = a, b
-        # The coupling seen from j is the transpose.
-        at_j[first : first + size] = 0.0
-        for row in range(size):
-            x, y = from_i[first + row, 0], from_i[first + row, 1]
-            for column in range(size):
-                v = coupling[begin + row * size + column]
                 at_j[first + column, 0] += v * x
                 at_j[first + column, 1] += v * y
+            at_i[first + row, 0], at_i[first + row, 1] = a, b
         begin += size * size
         first += size
     for target, line in ((u_i, at_i), (u_j, at_j)):
         scatter_azimuthal(degree, line, field)
-        turn_from_axis(degree, polar, azimuth, tables, field, spare)
+        turn_from_axis(degree, turns, tables, field, spare)
         target[:k] += field[:k]
 
 
@@ -60,12 +70,12 @@ def _add_pair(degree, polar, azimuth, coupling, tables, q_i, q_j, u_i, u_j, fiel
 def _respond(degree, response, incoming, out):
     """out += T incoming, for fields (k, 3)."""
     data, indices, begin = response
+    incoming, out = incoming.reshape(-1), out.reshape(-1)
     for row in range(3 * (degree + 1) ** 2):
         total = 0.0
         for p in range(begin[row], begin[row + 1]):
-            column = indices[p]
-            total += data[p] * incoming[column // 3, column % 3]
-        out[row // 3, row % 3] += total
+            total += data[p] * incoming[indices[p]]
+        out[row] += total
 
 
 @njit(cache=True)
@@ -73,8 +83,8 @@ def couple_scene(centres, degrees, tables):
     """Everything about a scene that the iterations need, from centres (n, 3) [radii].
 
     degrees: (n, n) symmetric, of each pair. Returns the highest degree (n,) and the first harmonic
-    (n + 1,)
-    of the spheres; direction (polar angle, azimuth) and coupling of each pair j < i, row by row.
+    (n + 1,) of the spheres; for all pairs j < i, row by row, one after the other, `turns_to` their
+    directions and their couplings, and where those of each pair begin.
     """
     n = len(centres)
     highest = np.zeros(n, dtype=np.int64)
@@ -85,23 +95,33 @@ def couple_scene(centres, degrees, tables):
                 highest[i] = max(highest[i], degrees[i, j])
         starts[i + 1] = starts[i] + (highest[i] + 1) ** 2
     count = n * (n - 1) // 2
-    angles, p = np.empty((count, 2)), 0
-    couplings = [np.empty(0) for _ in range(count)]
+    begin, p = np.zeros((count + 1, 2), dtype=np.int64), 0
     for i in range(n):
         for j in range(i):
-            x, y, z = centres[i] - centres[j]
-            across = np.sqrt(x * x + y * y)
-            angles[p] = np.arctan2(across, z), np.arctan2(y, x)
-            distance = np.sqrt(across**2 + z * z)
-            couplings[p] = axial_coupling(degrees[i, j], distance, tables)
+            degree = degrees[i, j]
+            begin[p + 1, 0] = begin[p, 0] + (4 * (degree + 2) if degree > 0 else 0)
+            begin[p + 1, 1] = begin[p, 1] + (block_sizes(degree)[1] if degree > 0 else 9)
             p += 1
-    return highest, starts, angles, couplings
+    turns, couplings, p = np.empty(begin[count, 0]), np.empty(begin[count, 1]), 0
+    for i in range(n):
+        for j in range(i):
+            degree = degrees[i, j]
+            coupling = couplings[begin[p, 1] : begin[p + 1, 1]]
+            if degree == 0:
+                put_coupling_of_forces(centres[i], centres[j], coupling)
+            else:
+                apart = centres[i] - centres[j]
+                distance = np.sqrt(np.sum(apart**2))
+                turns[begin[p, 0] : begin[p + 1, 0]] = turns_to(degree, apart / distance).ravel()
+                coupling[:] = axial_coupling(degree, distance, tables)
+            p += 1
+    return highest, starts, turns, couplings, begin
 
 
 @njit(cache=True)
 def apply_system(moments, scene, degrees, response, tables, out):
     """out = moments + T sum_j K_ij moments_j, for moments (total, 3) of a coupled scene."""
-    highest, starts, angles, couplings = scene
+    highest, starts, turns, couplings, begin = scene
     largest = (np.max(highest) + 1) ** 2
     incoming = np.zeros(moments.shape)
     field, spare = np.empty((largest, 3)), np.empty((largest, 3))
@@ -109,17 +129,29 @@ def apply_system(moments, scene, degrees, response, tables, out):
     p = 0
     for i in range(len(highest)):
         for j in range(i):
-            _add_pair(
-                degrees[i, j], angles[p, 0], angles[p, 1], couplings[p], tables,
-                moments[starts[i] : starts[i + 1]], moments[starts[j] : starts[j + 1]],
-                incoming[starts[i] : starts[i + 1]], incoming[starts[j] : starts[j + 1]],
-                field, spare, lines,
-            )  # fmt: skip
+            degree = degrees[i, j]
+            if degree == 0:
+                _add_forces(couplings, begin[p, 1], moments, starts[i], starts[j], incoming)
+            else:
+                own, other = (starts[i], starts[i + 1]), (starts[j], starts[j + 1])
+                _add_pair(
+                    degree,
+                    turns[begin[p, 0] : begin[p + 1, 0]].reshape(4, degree + 2),
+                    couplings[begin[p, 1] : begin[p + 1, 1]],
+                    tables,
+                    moments[own[0] : own[1]],
+                    moments[other[0] : other[1]],
+                    incoming[own[0] : own[1]],
+                    incoming[other[0] : other[1]],
+                    field,
+                    spare,
+                    lines,
+                )
             p += 1
     out[:] = moments
     for i in range(len(highest)):
-        own = slice(starts[i], starts[i + 1])
-        _respond(highest[i], response, incoming[own], out[own])
+        u, q = incoming[starts[i] : starts[i + 1]], out[starts[i] : starts[i + 1]]
+        _respond(highest[i], response, u, q)
 
 
 @njit(cache=True)
@@ -136,8 +168,8 @@ def solve_scene(centres, flow, degrees, response, tables, tolerance, most):
     uniform, right = np.zeros((starts[n], 3)), np.zeros((starts[n], 3))
     for i in range(n):
         uniform[starts[i]] = np.sqrt(4.0 * np.pi) * flow
-        own = slice(starts[i], starts[i + 1])
-        _respond(highest[i], response, uniform[own], right[own])
+        u, q = uniform[starts[i] : starts[i + 1]], right[starts[i] : starts[i + 1]]
+        _respond(highest[i], response, u, q)
     iterations, residual = 0, 0.0
     solution = right
     if n > 1:

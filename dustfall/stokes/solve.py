@@ -9,11 +9,14 @@ from dustfall.solution import Solution, Status
 from dustfall.spheres import centre_distances, flow_direction
 from dustfall.stokes.harmonics import exact_response, response_matrix
 from dustfall.stokes.multipoles import solve_scene
-from dustfall.stokes.plan import Plan, plan_scene
+from dustfall.stokes.plan import Plan, error_bound, plan_scene
 from dustfall.stokes.translation import MOST_DEGREE, translation_tables
-from dustfall.units import FORCE_UNIT, RADIUS
+from dustfall.units import FORCE_UNIT, RADIUS, STOKES_DRAG
 
 MOST_ITERATIONS = 300
+
+RESIDUAL_SHARE = 0.01
+"""Of the tolerance, for the error that is left by the iteration."""
 
 
 def forces_on_fixed_spheres(centres, flow=(0.0, 1.0, 0.0), tolerance: float = 1e-4) -> np.ndarray:
@@ -67,24 +70,29 @@ METHODS = {"multipole": by_multipoles}
 def solve(plan: Plan, flow=(0.0, 1.0, 0.0), tolerance: float = 1e-4) -> Solution:
     """Solve a planned scene; flow and tolerance as in `forces_on_fixed_spheres`."""
     flow = flow_direction(flow)
-    gap = float(centre_distances(plan.centres).min() - 1.0)
+    distance = centre_distances(plan.centres)
+    gap = float(distance.min() - 1.0)
     n = len(plan.centres)
     if not np.any(flow):
         return Solution(np.zeros((n, 3)), np.zeros(n), 0, 0.0, gap, Status.CONVERGED)
-    # The system's condition grows as the smallest gap closes, and a residual says less.
-    strain = np.sqrt(min(gap, 1.0))
-    goal = 0.01 * tolerance * strain
+    # The system's condition grows as the smallest gap closes, and a residual says less; but not
+    # beyond what the degrees that pairs exchange can resolve of a gap, about 1 / (2 degree^2).
+    resolved = 0.5 / (plan.degrees.max(initial=0) + 1.0) ** 2
+    condition = 1.0 / np.sqrt(min(max(gap, resolved), 1.0))
+    goal = RESIDUAL_SHARE * tolerance / condition
     force, iterations, residual = solve_scene(
         plan.centres / RADIUS, flow, plan.degrees, _response(), translation_tables(), goal,
         MOST_ITERATIONS,
     )  # fmt: skip
     # The residual is relative to all spheres together, and may sit on one of them.
-    estimate = plan.error + np.sqrt(n) * residual / strain
+    force = FORCE_UNIT * RADIUS * force
+    estimate = error_bound(plan.centres, distance, plan.degrees, force / STOKES_DRAG)
+    estimate += np.sqrt(n) * residual * condition
     if residual > goal or not np.isfinite(force).all():
         status = Status.NOT_CONVERGED
     else:
         status = Status.CONVERGED if estimate.max() <= tolerance else Status.OUT_OF_REACH
-    return Solution(FORCE_UNIT * RADIUS * force, estimate, iterations, float(residual), gap, status)
+    return Solution(force, estimate, iterations, float(residual), gap, status)
 
 
 @cache

@@ -79,33 +79,43 @@ def translation_tables(degree: int = MOST_DEGREE):
 
 
 @njit(cache=True)
+def block_size(degree, total):
+    """Number of coefficients of the total azimuthal number M = `total`, 0 ... degree + 1."""
+    size = 0
+    for step in _COMPONENTS:
+        size += max(0, degree + 1 - abs(total + step))
+    return size
+
+
+@njit(cache=True)
 def block_sizes(degree):
-    """Number of coefficients of each total azimuthal number M = 0 ... degree + 1."""
-    sizes = np.zeros(degree + 2, dtype=np.int64)
+    """`block_size` of all M, and the number of entries of the matrices of all M."""
+    sizes, entries = np.empty(degree + 2, dtype=np.int64), 0
     for total in range(degree + 2):
-        for step in _COMPONENTS:
-            sizes[total] += max(0, degree + 1 - abs(total + step))
-    return sizes
+        sizes[total] = block_size(degree, total)
+        entries += sizes[total] ** 2
+    return sizes, entries
 
 
 @njit(cache=True)
-def _gradient(step, m, solid, gradient, out):
-    """Coefficients of order m + step of d_step applied to regular solid harmonics of order m."""
-    out[:] = 0.0
-    for l in range(max(abs(m), 1), len(solid)):  # noqa: E741
-        out[l - 1] = gradient[step, m + 2, l] * solid[l]
+def put_coupling_of_forces(centre, other, out):
+    """Write the coupling of the moments of degree 0 of two spheres, row by row: out (9,).
 
-
-@njit(cache=True)
-def _times(step, m, values, up, down, out):
-    """Coefficients of order m + step of x_step times harmonics of order m on the unit sphere."""
-    out[:] = 0.0
-    for l in range(abs(m), len(values)):  # noqa: E741
-        if values[l] != 0.0:
-            if l + 1 < len(values):
-                out[l + 1] += up[step, m + 2, l] * values[l]
-            if l > 0:
-                out[l - 1] += down[step, m + 2, l] * values[l]
+    centre, other: (3,) [radii]. The Rotne-Prager tensor, which is exact for uniform tractions
+    (Rotne and Prager 1969), times 4 pi, since moments and velocities of degree 0 are over and
+    times the root of that.
+    """
+    square = 0.0
+    for i in range(3):
+        square += (centre[i] - other[i]) ** 2
+    distance = np.sqrt(square)
+    along = (1.0 - 2.0 / square) / square
+    for i in range(3):
+        for j in range(3):
+            value = along * (centre[i] - other[i]) * (centre[j] - other[j])
+            if i == j:
+                value += 1.0 + 2.0 / (3.0 * square)
+            out[3 * i + j] = value / (2.0 * distance)
 
 
 @njit(cache=True)
@@ -115,13 +125,15 @@ def axial_coupling(degree, distance, tables):
     Rows: velocity on the sphere at (0, 0, distance); columns: traction on that at the origin.
     """
     moved, gradient, up, down, _, _, _ = tables
-    sizes = block_sizes(degree)
-    out = np.zeros(np.sum(sizes**2))
+    sizes, entries = block_sizes(degree)
+    out = np.empty(entries)
     length = degree + 3
-    powers = distance ** -np.arange(2.0 * length + 1.0)
-    one, source = np.empty(length), np.empty(length)
-    phi, psi = np.empty(length), np.empty(length)
-    slope, product, velocity = np.empty(length), np.empty(length), np.empty((3, length))
+    powers = np.empty(2 * length)
+    powers[0] = 1.0
+    for t in range(2 * length - 1):
+        powers[t + 1] = powers[t] / distance
+    # Of the column's traction: potentials of its component and of y.f, and d_r of the former.
+    phi, psi, slope = np.empty(length), np.empty(length), np.zeros(length)
     begin = 0
     for total in range(degree + 2):
         size = sizes[total]
@@ -130,32 +142,33 @@ def axial_coupling(degree, distance, tables):
             m = total + _COMPONENTS[s]
             # a.b = a_z b_z + (a_+ b_- + a_- b_+) in the scaled components: the partner of s.
             partner = (3 - s) % 3
+            scale = 1.0 if s == 0 else np.sqrt(0.5)
             for l in range(abs(m), degree + 1):  # noqa: E741
-                one[:] = 0.0
-                one[l] = 1.0
-                _times(partner, m, one, up, down, source)
-                scale = 1.0 if s == 0 else np.sqrt(0.5)
+                above = scale * up[partner, m + 2, l]
+                below = scale * down[partner, m + 2, l] if l > 0 else 0.0
                 for t in range(length):
                     phi[t] = moved[abs(m), t, l] * powers[l + t + 1]
-                    psi[t] = moved[total, t, l + 1] * powers[l + t + 2] * source[l + 1]
+                    psi[t] = above * moved[total, t, l + 1] * powers[l + t + 2]
                     if l > 0:
-                        psi[t] += moved[total, t, l - 1] * powers[l + t] * source[l - 1]
-                    psi[t] *= scale
-                velocity[:] = 0.0
-                velocity[s] = phi
-                for r in range(3):
-                    weight = 1.0 if r == 0 else np.sqrt(0.5)
-                    _gradient(r, m, phi, gradient, slope)
-                    _times(partner, m + _COMPONENTS[r], slope, up, down, product)
-                    velocity[r] -= weight * scale * product
-                    if s == 0:
-                        velocity[r] -= weight * distance * slope
-                    _gradient(r, total, psi, gradient, slope)
-                    velocity[r] += weight * slope
+                        psi[t] += below * moved[total, t, l - 1] * powers[l + t]
                 row = 0
                 for r in range(3):
-                    for t in range(abs(total + _COMPONENTS[r]), degree + 1):
-                        out[begin + row * size + column] = velocity[r, t] / (8.0 * np.pi)
+                    weight = 1.0 if r == 0 else np.sqrt(0.5)
+                    order = total + _COMPONENTS[r]
+                    mixed = m + _COMPONENTS[r]
+                    for t in range(length - 1):
+                        slope[t] = gradient[r, m + 2, t + 1] * phi[t + 1]
+                    for t in range(abs(order), degree + 1):
+                        times = down[partner, mixed + 2, t + 1] * slope[t + 1]
+                        if t > 0:
+                            times += up[partner, mixed + 2, t - 1] * slope[t - 1]
+                        value = gradient[r, total + 2, t + 1] * psi[t + 1] - scale * times
+                        if s == 0:
+                            value -= distance * slope[t]
+                        value *= weight
+                        if r == s:
+                            value += phi[t]
+                        out[begin + row * size + column] = value / (8.0 * np.pi)
                         row += 1
                 column += 1
         begin += size * size
@@ -163,21 +176,42 @@ def axial_coupling(degree, distance, tables):
 
 
 @njit(cache=True)
-def _turned_about_z(degree, angle, field):
-    """Turn a vector field, harmonics and components, about z by an angle, in place."""
-    for n in range(1, degree + 1):
+def turns_to(degree, direction):
+    """Cosines and sines of m times the azimuth, then of m times the polar angle: (4, degree + 2).
+
+    direction: (3,), unit vector. m = 0 ... degree + 1; a recurrence, so nothing is trigonometric.
+    """
+    out = np.empty((4, degree + 2))
+    across = np.sqrt(direction[0] ** 2 + direction[1] ** 2)
+    azimuth = (direction[0] / across, direction[1] / across) if across > 0.0 else (1.0, 0.0)
+    for row, (c, s) in ((0, azimuth), (2, (direction[2], across))):
+        out[row, 0], out[row + 1, 0] = 1.0, 0.0
+        for m in range(degree + 1):
+            cosine, sine = out[row, m], out[row + 1, m]
+            out[row, m + 1] = c * cosine - s * sine
+            out[row + 1, m + 1] = s * cosine + c * sine
+    return out
+
+
+@njit(cache=True)
+def _turned_about_z(degree, cosines, sines, sense, field):
+    """Turn a vector field, harmonics and components, about z in place; sense: 1 or -1.
+
+    cosines, sines: of m times the angle, m = 0 ... degree, and 1 for the components.
+    """
+    for n in range(degree + 1):
         middle = n * n + n
         for m in range(1, n + 1):
-            c, s = np.cos(m * angle), np.sin(m * angle)
+            c, s = cosines[m], sense * sines[m]
             for i in range(3):
                 even, odd = field[middle + m, i], field[middle - m, i]
                 field[middle + m, i] = c * even - s * odd
                 field[middle - m, i] = s * even + c * odd
-    c, s = np.cos(angle), np.sin(angle)
+    c1, s1 = cosines[1], sense * sines[1]
     for k in range((degree + 1) ** 2):
         x, y = field[k, 0], field[k, 1]
-        field[k, 0] = c * x - s * y
-        field[k, 1] = s * x + c * y
+        field[k, 0] = c1 * x - s1 * y
+        field[k, 1] = s1 * x + c1 * y
 
 
 @njit(cache=True)
@@ -195,21 +229,21 @@ def _axes_swapped(degree, field, tables, out):
 
 
 @njit(cache=True)
-def turn_to_axis(degree, polar, azimuth, tables, field, spare):
-    """Turn the frame so that the direction (polar, azimuth) becomes z; field (k, 3), in place."""
-    _turned_about_z(degree, -azimuth, field)
+def turn_to_axis(degree, turns, tables, field, spare):
+    """Turn the frame so that the direction of `turns_to` becomes z; field (k, 3), in place."""
+    _turned_about_z(degree, turns[0], turns[1], -1.0, field)
     _axes_swapped(degree, field, tables, spare)
-    _turned_about_z(degree, polar, spare)
+    _turned_about_z(degree, turns[2], turns[3], 1.0, spare)
     _axes_swapped(degree, spare, tables, field)
 
 
 @njit(cache=True)
-def turn_from_axis(degree, polar, azimuth, tables, field, spare):
+def turn_from_axis(degree, turns, tables, field, spare):
     """Undo `turn_to_axis`."""
     _axes_swapped(degree, field, tables, spare)
-    _turned_about_z(degree, -polar, spare)
+    _turned_about_z(degree, turns[2], turns[3], -1.0, spare)
     _axes_swapped(degree, spare, tables, field)
-    _turned_about_z(degree, azimuth, field)
+    _turned_about_z(degree, turns[0], turns[1], 1.0, field)
 
 
 @njit(cache=True)

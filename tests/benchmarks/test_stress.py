@@ -23,6 +23,22 @@ def test_every_gap_is_within_tolerance_or_says_that_it_is_not(monkeypatch):
     assert (table["error"] <= table["tolerance"]).all()
 
 
+def test_no_crowd_fools_the_error_estimate(monkeypatch):
+    monkeypatch.setattr(stress, "FINE_DEGREE", 40)
+    monkeypatch.setattr(stress, "LURES", stress.LURES[:3])
+    few = [
+        (name, centres)
+        for name, centres in stress._crowds()
+        if "square" in name or "far" in name or name == "lattice of 125"
+    ]
+    monkeypatch.setattr(stress, "_crowds", lambda: few)
+    table = stress.crowds((1e-3, 1e-4, 1e-5))
+    converged = table["status"] == "converged"
+    assert converged.all()
+    assert (table["error"] <= table["tolerance"]).all()
+    assert (table["error"] <= table["estimate"]).all()
+
+
 def test_pairs_far_apart_are_exact_to_the_tolerance():
     table = stress.distances((1e-4, 1e-8), values=(10.0, 1e4))
     assert (table["error"] <= table["tolerance"]).all()

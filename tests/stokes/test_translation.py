@@ -10,34 +10,35 @@ from dustfall.stokes.translation import (
     axial_coupling,
     block_sizes,
     gather_azimuthal,
+    put_coupling_of_forces,
     scatter_azimuthal,
     translation_tables,
     turn_from_axis,
     turn_to_axis,
+    turns_to,
 )
 
 TABLES = translation_tables()
 RNG = np.random.default_rng(4)
 
 
-def coupled(order, shift, at_i, at_j):
+def coupled(degree, shift, at_i, at_j):
     """Velocities on spheres i and j, i at `shift` from j [radii], by the tractions on the other."""
     distance = np.linalg.norm(shift)
-    polar, azimuth = np.arccos(shift[2] / distance), np.arctan2(shift[1], shift[0])
-    k = (order + 1) ** 2
+    k = (degree + 1) ** 2
     u_i, u_j = np.zeros((k, 3)), np.zeros((k, 3))
     _add_pair(
-        order, polar, azimuth, axial_coupling(order, distance, TABLES), TABLES, at_i, at_j,
-        u_i, u_j, np.empty((k, 3)), np.empty((k, 3)), np.empty((4, 3 * k, 2)),
+        degree, turns_to(degree, shift / distance), axial_coupling(degree, distance, TABLES),
+        TABLES, at_i, at_j, u_i, u_j, np.empty((k, 3)), np.empty((k, 3)), np.empty((4, 3 * k, 2)),
     )  # fmt: skip
     return u_i, u_j
 
 
-def integrated(order, shift, traction):
+def integrated(degree, shift, traction):
     """Harmonics of the velocity on a sphere at `shift`, by quadrature on both spheres."""
     points, weights = lebedev_rule(77)
     points = points.T
-    harmonics = real_harmonics(order, points)
+    harmonics = real_harmonics(degree, points)
     loads = weights[:, None] * (harmonics @ traction)
     velocity = np.empty((len(points), 3))
     for p, x in enumerate(points):
@@ -50,55 +51,76 @@ def integrated(order, shift, traction):
 @pytest.mark.parametrize(
     "shift", [[1.1, -1.7, 1.9], [0.0, 0.0, 2.6], [0.0, 0.0, -2.6], [-3.0, 0.0, 0.0], [0, 9.0, 2.0]]
 )
-@pytest.mark.parametrize("order", [0, 1, 6])
-def test_coupling_is_the_integral_over_both_spheres(order, shift):
+@pytest.mark.parametrize("degree", [0, 1, 6])
+def test_coupling_is_the_integral_over_both_spheres(degree, shift):
     shift = np.array(shift, dtype=float)
-    tractions = RNG.normal(size=(2, (order + 1) ** 2, 3))
-    u_i, u_j = coupled(order, shift, *tractions)
-    np.testing.assert_allclose(u_i, integrated(order, shift, tractions[1]), atol=1e-13)
-    np.testing.assert_allclose(u_j, integrated(order, -shift, tractions[0]), atol=1e-13)
+    tractions = RNG.normal(size=(2, (degree + 1) ** 2, 3))
+    u_i, u_j = coupled(degree, shift, *tractions)
+    np.testing.assert_allclose(u_i, integrated(degree, shift, tractions[1]), atol=1e-13)
+    np.testing.assert_allclose(u_j, integrated(degree, -shift, tractions[0]), atol=1e-13)
 
 
-@pytest.mark.parametrize("order", [3, 20, 40])
-def test_coupling_is_reciprocal(order):
+@pytest.mark.parametrize("degree", [3, 20, 40])
+def test_coupling_is_reciprocal(degree):
     """Lorentz: the power of either traction in the other's flow is the same."""
-    one, other = RNG.normal(size=(2, (order + 1) ** 2, 3))
+    one, other = RNG.normal(size=(2, (degree + 1) ** 2, 3))
     shift = np.array([0.9, 1.2, -1.5])
-    u_i, u_j = coupled(order, shift, one, other)
+    u_i, u_j = coupled(degree, shift, one, other)
     # Seen from the other side, with the spheres' names exchanged.
-    v_j, v_i = coupled(order, -shift, other, one)
+    v_j, v_i = coupled(degree, -shift, other, one)
     np.testing.assert_allclose(np.sum(one * u_i), np.sum(other * u_j), rtol=1e-11)
     scale = np.abs(u_i).max()
     np.testing.assert_allclose(v_i, u_i, atol=1e-11 * scale)
     np.testing.assert_allclose(v_j, u_j, atol=1e-11 * scale)
 
 
-@pytest.mark.parametrize("order", [0, 2, 11, 40])
-def test_turning_there_and_back_changes_nothing(order):
-    field = RNG.normal(size=((order + 1) ** 2, 3))
+@pytest.mark.parametrize("degree", [0, 2, 11, 40])
+def test_turning_there_and_back_changes_nothing(degree):
+    field = RNG.normal(size=((degree + 1) ** 2, 3))
     turned, spare = field.copy(), np.empty_like(field)
-    turn_to_axis(order, 0.7, -2.1, TABLES, turned, spare)
+    turns = turns_to(degree, np.array([-0.48, -0.6, 0.64]))
+    turn_to_axis(degree, turns, TABLES, turned, spare)
     np.testing.assert_allclose(np.sum(turned**2), np.sum(field**2), rtol=1e-12)
-    turn_from_axis(order, 0.7, -2.1, TABLES, turned, spare)
+    turn_from_axis(degree, turns, TABLES, turned, spare)
     np.testing.assert_allclose(turned, field, atol=1e-11)
 
 
 def test_turned_field_is_the_field_seen_in_turned_axes():
-    order, polar, azimuth = 4, 0.8, 2.3
-    field = RNG.normal(size=((order + 1) ** 2, 3))
+    degree, polar, azimuth = 4, 0.8, 2.3
+    field = RNG.normal(size=((degree + 1) ** 2, 3))
     turned = field.copy()
-    turn_to_axis(order, polar, azimuth, TABLES, turned, np.empty_like(field))
     c, s, C, S = np.cos(polar), np.sin(polar), np.cos(azimuth), np.sin(azimuth)
+    turns = turns_to(degree, np.array([s * C, s * S, c]))
+    turn_to_axis(degree, turns, TABLES, turned, np.empty_like(field))
     axes = np.array([[c * C, c * S, -s], [-S, C, 0.0], [s * C, s * S, c]])
     points = lebedev_rule(9)[0].T
-    seen = real_harmonics(order, points @ axes.T) @ turned
-    np.testing.assert_allclose(seen, (real_harmonics(order, points) @ field) @ axes.T, atol=1e-12)
+    seen = real_harmonics(degree, points @ axes.T) @ turned
+    np.testing.assert_allclose(seen, (real_harmonics(degree, points) @ field) @ axes.T, atol=1e-12)
 
 
-@pytest.mark.parametrize("order", [0, 1, 5])
-def test_azimuthal_numbers_hold_the_whole_field(order):
-    field = RNG.normal(size=((order + 1) ** 2, 3))
-    values, again = np.zeros((block_sizes(order).sum(), 2)), np.empty_like(field)
-    gather_azimuthal(order, field, values)
-    scatter_azimuthal(order, values, again)
+@pytest.mark.parametrize("degree", [0, 1, 5])
+def test_azimuthal_numbers_hold_the_whole_field(degree):
+    field = RNG.normal(size=((degree + 1) ** 2, 3))
+    values, again = np.zeros((block_sizes(degree)[0].sum(), 2)), np.empty_like(field)
+    gather_azimuthal(degree, field, values)
+    scatter_azimuthal(degree, values, again)
     np.testing.assert_allclose(again, field, atol=1e-14)
+
+
+@pytest.mark.parametrize("direction", [[0, 0, 1], [0, 0, -1], [-0.6, 0, 0.8], [0.48, -0.6, -0.64]])
+def test_turns_are_the_angles_of_their_direction(direction):
+    polar, azimuth = np.arccos(direction[2]), np.arctan2(direction[1], direction[0])
+    m = np.arange(41 + 1)
+    expected = [np.cos(m * azimuth), np.sin(m * azimuth), np.cos(m * polar), np.sin(m * polar)]
+    np.testing.assert_allclose(turns_to(40, np.array(direction, float)), expected, atol=1e-13)
+
+
+def test_coupling_of_forces_is_that_of_degree_zero():
+    shift = np.array([1.1, -1.7, 1.9])
+    forces = RNG.normal(size=(2, 1, 3))
+    u_i, u_j = coupled(0, shift, *forces)
+    tensor = np.empty(9)
+    put_coupling_of_forces(shift, np.zeros(3), tensor)
+    tensor = tensor.reshape(3, 3)
+    np.testing.assert_allclose(tensor @ forces[1, 0], u_i[0], rtol=1e-13)
+    np.testing.assert_allclose(tensor @ forces[0, 0], u_j[0], rtol=1e-13)

@@ -12,6 +12,7 @@ tolerances = snakemake.params.tolerances
 table = pd.concat(
     [
         stress.gaps(tolerances, progress=progress("gaps", "solves")),
+        stress.crowds(tolerances, progress=progress("crowds", "solves")),
         stress.distances(tolerances),
         stress.invariances(tolerances),
         stress.turned_mesh(),
