@@ -15,6 +15,9 @@ from dustfall.suspension.window import fold, unfold, window_kernels, window_poly
 PAIR_NUMBERS = 5
 """Stored for a pair: across, along / r^2, and the three components of r."""
 
+FEWEST_CELLS = 4
+"""Along a side, that particles are counted in to see whether they crowd."""
+
 CROWDED = 2.0
 """Density around a particle over the mean density from which on the splitting follows it."""
 
@@ -237,9 +240,7 @@ def _splitting_for(positions, side, tolerance):
     n, crowding = len(positions), 1.0
     while True:
         splitting = choose_splitting(n, side, tolerance, crowding)
-        cells = int(side / splitting.reach)
-        if cells < 3:
-            return splitting
+        cells = max(FEWEST_CELLS, int(side / splitting.reach))
         # Pairs within a cell, of a Poisson cloud: the square of the particles expected there.
         number = np.bincount(_sort_key(positions, side, cells)[0]).astype(float)
         found = (number * (number - 1)).sum() * cells**3 / n**2
