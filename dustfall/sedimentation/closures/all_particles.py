@@ -121,15 +121,14 @@ class AllParticles(Closure):
         Raises ValueError for a cube too small for the near field, FloatingPointError where the
         forces are not found.
         """
-        if self._splitting is None:
-            self._begin(state)
+        splitting = self._splitting or self._begin(state)
         half = self.step / 2
         side = state.box_length
         mobility = PeriodicMobility(
             state.position + half * self.stokes_number * state.velocity,
             side,
             threads=self.threads,
-            splitting=self._splitting,
+            splitting=splitting,
         )
         order = mobility.order
         velocity = state.velocity[order]
@@ -151,11 +150,11 @@ class AllParticles(Closure):
             "stopped": near.stopped,
             "overlaps": near.overlapping,
             "box_reynolds": fluctuation * side * self.stokes_number / self.viscosity,
-            "memory_from": 1 / (self.viscosity * self._splitting.last_wavenumber**2),
+            "memory_from": 1 / (self.viscosity * splitting.last_wavenumber**2),
         }
         return Drag(np.zeros(len(velocity)), total, whole_step=True)
 
-    def _begin(self, state: State) -> None:
+    def _begin(self, state: State) -> Splitting:
         # For the mean density and for the whole run: the waves that are kept are those of its grid.
         particles, side = len(state.position), state.box_length
         splitting = choose_splitting(particles, side, self.tolerance)
@@ -177,6 +176,7 @@ class AllParticles(Closure):
             self._decay_half = (1 - grown_half).astype(as_stored)[..., None]
             if self._waves is None:
                 self._waves = np.zeros((*square.shape, 3), np.result_type(as_stored, np.complex64))
+        return splitting
 
     def _near(self, state: State, order: np.ndarray) -> NearField:
         """Close pairs, in the order of the mobility."""
