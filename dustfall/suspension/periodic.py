@@ -3,10 +3,14 @@
 import numpy as np
 from scipy.special import erfc
 
-from dustfall.units import RADIUS
+from dustfall.suspension.rotne_prager import pair_coefficients
+from dustfall.units import CONTACT, RADIUS
 
 HASIMOTO = 2.837297
 """Images slow a sphere in a periodic cube of side L by this times radius / L (Hasimoto 1959)."""
+
+CLOSEST = 0.01
+"""Distance of two centres [d_p] below which Beenakker's sum loses digits to (radius / r)^3."""
 
 
 def periodic_mobility(positions, side: float, tolerance=1e-5, splitting=None) -> np.ndarray:
@@ -15,7 +19,7 @@ def periodic_mobility(positions, side: float, tolerance=1e-5, splitting=None) ->
     Rotne-Prager tensor, in units of an isolated sphere's mobility (Beenakker 1986, J. Chem. Phys.
     85, 1581). The term of wavenumber zero is left out: spheres and fluid together have no net
     flux, which is how a suspension settles in a vessel with a bottom. The matrix is symmetric and
-    positive definite where spheres do not overlap.
+    positive definite, also where spheres overlap (`pair_coefficients`).
 
     Parameters
     ----------
@@ -27,7 +31,7 @@ def periodic_mobility(positions, side: float, tolerance=1e-5, splitting=None) ->
 
     Raises
     ------
-    ValueError : positions of another shape, or two spheres overlap.
+    ValueError : positions of another shape, or two centres closer than `CLOSEST`.
     """
     positions = np.asarray(positions, dtype=float)
     if positions.ndim != 2 or positions.shape[1] != 3:
@@ -36,14 +40,17 @@ def periodic_mobility(positions, side: float, tolerance=1e-5, splitting=None) ->
     reach = np.sqrt(-np.log(tolerance)) + 0.5
     # The real sum needs the nearest image alone when its terms have died out at half the side.
     xi = 2 * reach / side if splitting is None else splitting
-    images = int(np.ceil(reach / (xi * side) - 0.5))
+    # Overlapping spheres have terms of their own, of any image.
+    images = int(np.ceil(max(reach / xi, CONTACT) / side - 0.5))
     mobility = np.zeros((3, 3, n, n))
     separation = positions[:, None] - positions[None]
     separation -= side * np.rint(separation / side)
-    closest = np.linalg.norm(separation, axis=2) + 2 * np.eye(n)
-    if closest.min() < 1:
+    closest = np.linalg.norm(separation, axis=2) + side * np.eye(n)
+    if closest.min() < CLOSEST:
         i, j = np.unravel_index(closest.argmin(), closest.shape)
-        raise ValueError(f"spheres {i} and {j} overlap: their distance is {closest[i, j]}")
+        raise ValueError(
+            f"the centres of spheres {i} and {j} are {closest[i, j]} d_p apart: {CLOSEST} is needed"
+        )
     shifts = range(-images, images + 1)
     for shift in ((i, j, k) for i in shifts for j in shifts for k in shifts):
         _add_real(mobility, separation + side * np.array(shift), xi, itself=shift == (0, 0, 0))
@@ -56,7 +63,7 @@ def periodic_mobility(positions, side: float, tolerance=1e-5, splitting=None) ->
 
 
 def _add_real(mobility, separation, xi, itself):
-    """Beenakker's M^(1), the part that dies out with the distance."""
+    """Beenakker's M^(1), the part that dies out with the distance; overlapping pairs corrected."""
     a = RADIUS
     r = np.linalg.norm(separation, axis=2)
     if itself:
@@ -81,6 +88,12 @@ def _add_real(mobility, separation, xi, itself):
         - 2 * xi**3 * a**3
         - 3 * xi * a**3 / r2
     )
+    overlapping = r < CONTACT
+    near = [pair_coefficients(distance) for distance in r[overlapping]]
+    near_across, near_along = np.array(near).reshape(-1, 2).T
+    q = a / r[overlapping]
+    across[overlapping] += near_across - (0.75 * q + 0.5 * q**3)
+    along[overlapping] += near_along - (0.75 * q - 1.5 * q**3)
     direction = separation / np.sqrt(r2)[:, :, None]
     for p in range(3):
         mobility[p, p] += across

@@ -39,13 +39,20 @@ def test_few_spheres_in_a_huge_cube_are_those_in_unbounded_fluid():
     np.testing.assert_allclose(force, rotne_prager_forces(centres), atol=1e-5)
 
 
-def test_whole_sides_change_nothing_and_overlaps_are_refused():
+def test_whole_sides_change_nothing_and_coincident_centres_are_refused():
     positions, side = random_positions(np.random.default_rng(1), 20, 1e-2), box_length(20, 1e-2)
     images = positions + side * np.random.default_rng(2).integers(-5, 6, positions.shape)
     np.testing.assert_allclose(
         periodic_mobility(images, side), periodic_mobility(positions, side), atol=1e-12
     )
-    with pytest.raises(ValueError, match="spheres 0 and 1 overlap"):
-        periodic_mobility([[0.1, 0, 0], [side - 0.1, 0, 0]], side)
+    with pytest.raises(ValueError, match="centres of spheres 0 and 1"):
+        periodic_mobility([[0.001, 0, 0], [side - 0.001, 0, 0]], side)
     with pytest.raises(ValueError, match="shape"):
         periodic_mobility(np.zeros((4, 2)), side)
+
+
+def test_overlapping_spheres_and_their_images_have_a_positive_mobility():
+    positions = np.random.default_rng(3).uniform(0, 1.4, (3, 3))
+    one, other = (periodic_mobility(positions, 1.4, 1e-14, splitting) for splitting in (4.0, 7.0))
+    np.testing.assert_allclose(one, other, atol=1e-8)
+    assert np.linalg.eigvalsh(one).min() > 0

@@ -1,5 +1,6 @@
 """Closures: what tells the drag on all particles from their state."""
 
+from dustfall.sedimentation.closures.all_particles import AllParticles
 from dustfall.sedimentation.closures.nearest_neighbours import NearestNeighbours
 
-__all__ = ["NearestNeighbours"]
+__all__ = ["AllParticles", "NearestNeighbours"]
