@@ -31,7 +31,7 @@ SHAPES = 6
 
 
 @njit(cache=True, inline="always")
-def _shape_functions(l0, l1, l2, out):
+def shape_functions(l0, l1, l2, out):
     out[0] = l0 * (2.0 * l0 - 1.0)
     out[1] = l1 * (2.0 * l1 - 1.0)
     out[2] = l2 * (2.0 * l2 - 1.0)
@@ -46,7 +46,7 @@ def _points_on(corners, barycentric, position, shape, density):
     place_points(corners, barycentric, False, position, density)
     for q in range(len(barycentric)):
         l0, l1, l2 = barycentric[q]
-        _shape_functions(l0, l1, l2, shape[q])
+        shape_functions(l0, l1, l2, shape[q])
 
 
 def element_points(mesh: SphereMesh, rule: int):

@@ -1,0 +1,159 @@
+"""Meshed spheres, assembled and inverted once: what every sphere of every scene is a copy of.
+
+A sphere far from all others takes the plain template of a level; one that nearly touches another
+takes the template that is graded towards its north pole, turned until the pole faces the gap. Only
+a sphere with several narrow gaps needs a mesh of its own.
+
+Spheres that are not close exchange what a few points carry. With the points x_p and weights w_p of
+Lebedev's rule (1976), exact to degree 2 L, any field on the sphere is taken through its values at
+the points, u(x) ~ sum_p w_p sum_(l <= L) (2 l + 1) P_l(x . x_p) u(x_p) (hyperinterpolation, Sloan
+1995), and the traction leaves as one force at each point by the transposed map. So a far pair costs
+p^2 Stokeslets, and no field of the mesh is replaced by one of harmonics within a sphere.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial.legendre import legval
+from scipy.integrate import lebedev_rule
+from scipy.linalg import cho_factor, cho_solve
+from scipy.spatial.transform import Rotation
+
+from dustfall.stokes.elements.mesh import SphereMesh, sphere_mesh
+from dustfall.stokes.elements.single_layer import nodal_integrals, self_interaction
+from dustfall.units import FORCE_UNIT, RADIUS, STOKES_DRAG
+
+
+class Level(NamedTuple):
+    """How finely a sphere is discretised.
+
+    size: edge length [radii]. accuracy: relative error of forces that it is meant for. quadrature:
+    `self_interaction`'s singular and regular points a direction and separation.
+    """
+
+    size: float
+    accuracy: float
+    quadrature: tuple[int, int, float]
+
+
+LEVELS = (
+    Level(1.2, 1e-2, (5, 4, 0.5)),
+    Level(1.0, 1e-3, (5, 4, 0.5)),
+    Level(0.7, 1e-4, (5, 4, 0.5)),
+    Level(0.5, 1e-5, (5, 4, 1.0)),
+    Level(0.35, 1e-6, (6, 5, 1.0)),
+)
+"""Each halves the elements' area or more; 30, 50, 78, 154 and 320 elements without grading."""
+
+RESOLVED = 2.9
+"""A gap g [radii] is resolved by edges of RESOLVED sqrt(g) times the level's size: the traction
+varies over sqrt(g), and measured at gaps of 0.002 to 0.1 finer edges gain nothing."""
+
+MOST_GRADINGS = 6
+"""How often the edge length is halved at most; serves gaps down to 3e-5 radii."""
+
+
+@dataclass(frozen=True, eq=False)
+class Exchange:
+    """How a template meets far spheres.
+
+    points: (p, 3) unit vectors. spread: (n, p), weight of the field at a point in the equation of a
+    node, and of the traction of a node in the force at a point. response: (3p, 3p), forces at the
+    points by the velocities there.
+    """
+
+    points: np.ndarray
+    spread: np.ndarray
+    response: np.ndarray
+
+
+class Template:
+    """A mesh of the sphere with its inverted single-layer matrix; lengths in d_p, mu = 1.
+
+    Traction and test functions are continuous and quadratic on projected elements
+    (`single_layer`). areas: (n,), force by a unit of traction at each node. inverse: (3n, 3n), of
+    the matrix with the outer product of the normals added, which no flow excites.
+    """
+
+    def __init__(self, mesh: SphereMesh, level: Level):
+        self.mesh, self.level = mesh, level
+        matrix = self_interaction(mesh, *level.quadrature)
+        normals = nodal_integrals(mesh, lambda n: n).ravel()
+        matrix += np.outer(normals, normals)
+        factor = cho_factor(matrix, lower=True, overwrite_a=True, check_finite=False)
+        self.inverse = cho_solve(factor, np.eye(len(normals)), overwrite_b=True)
+        self.areas = nodal_integrals(mesh, lambda n: np.ones(len(n)))[:, 0]
+        self._exchanges: dict[int, Exchange] = {}
+
+    @cached_property
+    def lone_error(self) -> float:
+        """Relative error of the drag on a lone sphere, whatever the direction of the flow."""
+        uniform = np.kron(self.areas[:, None], np.eye(3))
+        drag = uniform.T @ self.inverse @ uniform
+        return float(np.abs(FORCE_UNIT * drag / STOKES_DRAG - np.eye(3)).max())
+
+    def exchange(self, degree: int) -> Exchange:
+        """Points, maps and response that carry fields up to this degree."""
+        if degree not in self._exchanges:
+            points, weights = exchange_rule(degree)
+            factors = 2.0 * np.arange(degree + 1.0) + 1.0
+            spread = nodal_integrals(
+                self.mesh, lambda n: legval(n @ points.T, factors) * weights, 8 + degree // 2
+            )
+            spread3 = np.kron(spread, np.eye(3))
+            response = spread3.T @ (self.inverse @ spread3)
+            self._exchanges[degree] = Exchange(points, spread, response)
+        return self._exchanges[degree]
+
+
+def exchange_rule(degree: int) -> tuple[np.ndarray, np.ndarray]:
+    """Unit vectors (p, 3) and weights (p,) with sum 1, exact up to twice the degree or better."""
+    points, weights = lebedev_rule(_lebedev_degree(2 * degree))
+    return np.ascontiguousarray(points.T), weights / weights.sum()
+
+
+def _lebedev_degree(least: int) -> int:
+    """The smallest that has a rule of positive weights."""
+    return next(d for d in LEBEDEV_DEGREES if d >= least)
+
+
+LEBEDEV_DEGREES = (3, 5, 7, 9, 11, 15, 17, 19, 21, 23, 29, 31, 35)
+"""Degrees of Lebedev's rules, up to 434 points, without those that have negative weights."""
+
+MOST_DEGREE = LEBEDEV_DEGREES[-3] // 2
+"""Largest degree by which two spheres exchange fields; closer pairs are integrated in full."""
+
+
+@lru_cache(maxsize=None)
+def template(level: Level, grading: int = 0) -> Template:
+    """The template whose edges are halved `grading` times at the north pole (0: nowhere)."""
+    toward = [(0.0, 0.0, 1.0)] if grading else []
+    return Template(sphere_mesh(level.size, toward, [level.size / 2.0**grading] * len(toward)), level)
+
+
+def template_facing(level: Level, directions, gradings) -> tuple[Template, np.ndarray]:
+    """A template and the rotation (3, 3) that turns it so that fine elements face all gaps.
+
+    directions: (k, 3) unit vectors to the spheres that are close; gradings: (k,) halvings there.
+    """
+    directions, gradings = np.asarray(directions, float).reshape(-1, 3), np.asarray(gradings)
+    graded = np.flatnonzero(gradings)
+    if len(graded) == 0:
+        return template(level), np.eye(3)
+    if len(graded) == 1:
+        return template(level, int(gradings[graded[0]])), _from_north(directions[graded[0]])
+    mesh = sphere_mesh(level.size, directions[graded], level.size / 2.0 ** gradings[graded])
+    return Template(mesh, level), np.eye(3)
+
+
+def gradings_for(gap) -> np.ndarray:
+    """Halvings of the edge length that gaps [d_p] ask for."""
+    edge = RESOLVED * np.sqrt(np.asarray(gap) / RADIUS)
+    return np.clip(np.ceil(-np.log2(edge)), 0, MOST_GRADINGS).astype(int)
+
+
+def _from_north(direction) -> np.ndarray:
+    """A rotation (3, 3) of the north pole to a unit vector."""
+    return Rotation.align_vectors([direction], [(0.0, 0.0, 1.0)])[0].as_matrix()
