@@ -228,9 +228,7 @@ def _couple(target, source, shift):
                 rule = _sufficient_rule(distance, source.reach[f], source.far)
                 if rule <= last:
                     own_points, own_shapes = source.points[rule][f], source.shapes[rule][f]
-                    _add_element(
-                        x, y, z, own_points, own_shapes, own_points.shape[1], g, inner
-                    )
+                    _add_element(x, y, z, own_points, own_shapes, own_points.shape[1], g, inner)
                 else:
                     stack[0], level[0], top = whole, 0, 1
                     while top > 0:
@@ -247,7 +245,9 @@ def _couple(target, source, shift):
                             _add_element(x, y, z, points, shapes, len(weights), g, inner)
                             continue
                         if depth == MOST_HALVINGS:
-                            raise ValueError("spheres too close: an element was quartered too often")
+                            raise ValueError(
+                                "spheres too close: an element was quartered too often"
+                            )
                         for k in range(4):
                             quarter(part, k, stack[top])
                             level[top] = depth + 1

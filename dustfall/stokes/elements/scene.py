@@ -9,14 +9,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+from scipy.linalg import cho_factor, cho_solve
+from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import LinearOperator, gmres
 
-from dustfall.spheres import centre_distances, checked_centres, checked_flow
-from dustfall.stokes.elements.near_pairs import near_coupling, side
+from dustfall.spheres import centre_distances
 from dustfall.stokes.elements.mesh import SphereMesh
+from dustfall.stokes.elements.near_pairs import near_coupling, side
 from dustfall.stokes.elements.single_layer import put_block, stokeslet
 from dustfall.stokes.elements.templates import (
-    LEVELS,
     MOST_DEGREE,
     Exchange,
     Level,
@@ -24,7 +25,7 @@ from dustfall.stokes.elements.templates import (
     gradings_for,
     template_facing,
 )
-from dustfall.units import FORCE_UNIT, RADIUS, STOKES_DRAG
+from dustfall.units import FORCE_UNIT, RADIUS
 
 MOST_ITERATIONS = 300
 
@@ -38,27 +39,93 @@ class MeshedSphere:
     """One sphere of a scene: a template, where it is and how it is turned.
 
     centre: (3,) [d_p]. turn: (3, 3) rotation of the template. exchange: how it meets far spheres.
-    near: whether another sphere is integrated with it element by element.
     """
 
     template: Template
     centre: np.ndarray
     turn: np.ndarray
     exchange: Exchange
-    near: bool
-
-    @property
-    def unknowns(self) -> int:
-        """Tractions at the nodes if the sphere has near neighbours, else forces at the points."""
-        return len(self.exchange.spread) if self.near else len(self.exchange.points)
 
     def points(self) -> np.ndarray:
         """Points of the exchange [d_p], (p, 3)."""
         return self.centre + RADIUS * self.exchange.points @ self.turn.T
 
-    def answer(self, matrix, load) -> np.ndarray:
-        """A matrix of the template applied to vectors (k, 3) of the scene."""
-        return (matrix @ (load @ self.turn).ravel()).reshape(-1, 3) @ self.turn.T
+    def mesh(self) -> SphereMesh:
+        """The mesh of the unit sphere as it is turned."""
+        mesh = self.template.mesh
+        return SphereMesh(mesh.vertices @ self.turn.T, mesh.triangles)
+
+    def loads(self, velocity) -> np.ndarray:
+        """Loads of the nodes (n, 3), seen by the template, by velocities at the points (p, 3)."""
+        return self.exchange.spread @ (velocity @ self.turn)
+
+    def forces(self, traction) -> np.ndarray:
+        """Forces at the points (p, 3) by tractions of the nodes (n, 3), seen by the template."""
+        return (self.exchange.spread.T @ traction) @ self.turn.T
+
+
+class LoneSphere:
+    """A sphere without near neighbours: its answer is its template's."""
+
+    def __init__(self, sphere: MeshedSphere):
+        self.sphere = sphere
+
+    def forces(self, velocity) -> np.ndarray:
+        """Forces at the points by velocities there, (p, 3) each."""
+        response, turn = self.sphere.exchange.response, self.sphere.turn
+        return (response @ (velocity @ turn).ravel()).reshape(-1, 3) @ turn.T
+
+    def tractions(self, velocity) -> list[np.ndarray]:
+        """Tractions of the nodes, seen by the template."""
+        load = self.sphere.loads(velocity).ravel()
+        return [(self.sphere.template.inverse @ load).reshape(-1, 3)]
+
+
+class Cluster:
+    """Spheres that are near to each other, solved as one body.
+
+    Its matrix has the templates' own on the diagonal and the near pairs' beside it.
+    """
+
+    def __init__(self, spheres: list[MeshedSphere], near, level: Level):
+        self.spheres = spheres
+        ends = np.cumsum([0] + [len(sphere.template.matrix) for sphere in spheres])
+        matrix = np.zeros((ends[-1], ends[-1]))
+        for i, sphere in enumerate(spheres):
+            matrix[ends[i] : ends[i + 1], ends[i] : ends[i + 1]] = sphere.template.matrix
+            for j in np.flatnonzero(near[i, :i]):
+                # cho_factor reads the lower half alone.
+                matrix[ends[i] : ends[i + 1], ends[j] : ends[j + 1]] = _near_block(
+                    sphere, spheres[j], level
+                )
+        self._ends = ends[1:-1] // 3
+        self._point_ends = np.cumsum([len(sphere.exchange.points) for sphere in spheres])[:-1]
+        self._factor = cho_factor(matrix, lower=True, overwrite_a=True, check_finite=False)
+
+    def tractions(self, velocity) -> list[np.ndarray]:
+        """Tractions of the nodes of each sphere, seen by its template."""
+        own = np.split(velocity, self._point_ends)
+        pairs = zip(self.spheres, own, strict=True)
+        load = np.concatenate([sphere.loads(u) for sphere, u in pairs])
+        traction = cho_solve(self._factor, load.ravel(), check_finite=False)
+        return np.split(traction.reshape(-1, 3), self._ends)
+
+    def forces(self, velocity) -> np.ndarray:
+        """Forces at the points of all spheres by velocities there, (p, 3) each."""
+        pairs = zip(self.spheres, self.tractions(velocity), strict=True)
+        return np.concatenate([sphere.forces(f) for sphere, f in pairs])
+
+
+def _near_block(target: MeshedSphere, source: MeshedSphere, level: Level) -> np.ndarray:
+    """Loads of one sphere by the tractions of another, both as seen by their templates."""
+    shift = target.centre - source.centre
+    gap = (np.linalg.norm(shift) - 1.0) / RADIUS
+    # Near spheres amplify by 1 / gap what they do not feel alike.
+    tolerance = SHARE * level.accuracy * min(1.0, gap)
+    block = near_coupling(side(target.mesh(), tolerance), side(source.mesh(), tolerance), shift)
+    rows, columns = block.shape
+    block = target.turn.T @ block.reshape(rows // 3, 3, columns)
+    return (block.reshape(-1, 3) @ source.turn).reshape(rows, columns)
 
 
 def mesh_scene(centres, level: Level):
@@ -75,10 +142,8 @@ def mesh_scene(centres, level: Level):
         close = np.flatnonzero(near[i])
         directions = (centres[close] - centres[i]) / distance[i, close, None]
         template, turn = template_facing(level, directions, gradings_for(gap[i, close]))
-        degree = int(np.where(near[i], 0, degrees[i]).max())
-        spheres.append(
-            MeshedSphere(template, centres[i], turn, template.exchange(degree), len(close) > 0)
-        )
+        degree = int(np.where(near[i], 1, degrees[i]).max())
+        spheres.append(MeshedSphere(template, centres[i], turn, template.exchange(degree)))
     return spheres, near
 
 
@@ -134,79 +199,48 @@ class SceneSolution:
 
 
 def solve_on_meshes(centres, flow, level: Level, goal: float) -> SceneSolution:
-    """Solve a scene on one level; centres (n, 3) [d_p], flow (3,) of length 1, goal of GMRES."""
+    """Solve a scene on one level; centres (n, 3) [d_p], flow (3,) of length 1, goal of GMRES.
+
+    Unknown are the forces at the points of all spheres: forces = answer(flow - coupling forces).
+    """
     spheres, near = mesh_scene(centres, level)
-    count = [len(sphere.exchange.points) for sphere in spheres]
-    points = np.concatenate([sphere.points() for sphere in spheres])
-    coupling = _point_coupling(points, np.repeat(np.arange(len(spheres)), count), near)
-    blocks = _near_blocks(spheres, near, level)
-    point_ends = np.cumsum(count)[:-1]
-    ends = np.cumsum([sphere.unknowns for sphere in spheres])[:-1]
+    _, cluster = connected_components(near, directed=False)
+    # Spheres of a cluster stand side by side.
+    order = np.argsort(cluster, kind="stable")
+    members = np.split(order, np.cumsum(np.bincount(cluster))[:-1])
+    bodies = [
+        Cluster([spheres[i] for i in own], near[np.ix_(own, own)], level)
+        if len(own) > 1
+        else LoneSphere(spheres[own[0]])
+        for own in members
+    ]
+    points = [spheres[i].points() for i in order]
+    owner = np.repeat(order, [len(own) for own in points])
+    coupling = _point_coupling(np.concatenate(points), owner, near)
+    ends = np.cumsum([sum(len(spheres[i].exchange.points) for i in own) for own in members])[:-1]
 
-    def tractions(velocity, loads):
-        """Unknowns of each sphere in a flow given at its points and, if near, at its nodes."""
-        out = []
-        for sphere, u, load in zip(spheres, velocity, loads, strict=True):
-            if sphere.near:
-                load = load + sphere.exchange.spread @ u
-                out.append(sphere.answer(sphere.template.inverse, load))
-            else:
-                out.append(sphere.answer(sphere.exchange.response, u))
-        return out
+    def answer(velocity):
+        parts = zip(bodies, np.split(velocity, ends), strict=True)
+        return np.concatenate([body.forces(u) for body, u in parts]).ravel()
 
-    def forces_at_points(unknowns):
-        return [
-            sphere.exchange.spread.T @ f if sphere.near else f
-            for sphere, f in zip(spheres, unknowns, strict=True)
-        ]
+    def system(forces):
+        return forces + answer((coupling @ forces).reshape(-1, 3))
 
-    def induced(unknowns):
-        """Velocities at points and loads at nodes that the other spheres' tractions induce."""
-        forces = np.concatenate(forces_at_points(unknowns))
-        velocity = np.split((coupling @ forces.ravel()).reshape(-1, 3), point_ends)
-        loads = [np.zeros((len(sphere.exchange.spread), 3)) for sphere in spheres]
-        for (i, j), block in blocks.items():
-            loads[i] += (block @ unknowns[j].ravel()).reshape(-1, 3)
-        return velocity, loads
-
-    def system(x):
-        unknowns = np.split(x.reshape(-1, 3), ends)
-        return x + np.concatenate(tractions(*induced(unknowns))).ravel()
-
-    undisturbed = [np.tile(flow, (n, 1)) for n in count]
-    right = np.concatenate(tractions(undisturbed, np.zeros(len(spheres)))).ravel()
-    solution, residuals = right, []
-    if len(spheres) > 1:
+    undisturbed = np.tile(flow, (len(owner), 1))
+    right = answer(undisturbed)
+    forces, residuals = right, []
+    if len(bodies) > 1:
         operator = LinearOperator((len(right), len(right)), matvec=system, dtype=float)
-        solution, _ = gmres(
+        forces, _ = gmres(
             operator, right, rtol=goal, restart=MOST_ITERATIONS, maxiter=1,
             callback=residuals.append, callback_type="pr_norm",
         )  # fmt: skip
-    unknowns = np.split(solution.reshape(-1, 3), ends)
-    velocity, _ = induced(unknowns)
-    traction = [
-        f if sphere.near else sphere.answer(
-            sphere.template.inverse, sphere.exchange.spread @ (flow - u)
-        )
-        for sphere, f, u in zip(spheres, unknowns, velocity, strict=True)
-    ]  # fmt: skip
-    force = FORCE_UNIT * np.array([f.sum(axis=0) for f in forces_at_points(unknowns)])
-    residual = residuals[-1] if residuals else 0.0
-    return SceneSolution(force, spheres, traction, len(residuals), float(residual))
-
-
-def _near_blocks(spheres, near, level) -> dict:
-    """The matrix of every ordered pair of spheres that is integrated element by element."""
-    blocks = {}
-    for i, j in zip(*np.nonzero(np.triu(near)), strict=True):
-        shift = spheres[i].centre - spheres[j].centre
-        gap = (np.linalg.norm(shift) - 1.0) / RADIUS
-        # What two near spheres induce on each other differs by this part of the whole.
-        tolerance = SHARE * level.accuracy * min(1.0, gap)
-        pair = []
-        for k in (i, j):
-            mesh, turn = spheres[k].template.mesh, spheres[k].turn
-            pair.append(side(SphereMesh(mesh.vertices @ turn.T, mesh.triangles), tolerance))
-        blocks[i, j] = near_coupling(*pair, shift)
-        blocks[j, i] = blocks[i, j].T
-    return blocks
+    velocity = np.split(undisturbed - (coupling @ forces).reshape(-1, 3), ends)
+    traction = [np.empty(0)] * len(spheres)
+    for own, body, u in zip(members, bodies, velocity, strict=True):
+        for i, f in zip(own, body.tractions(u), strict=True):
+            traction[i] = f @ spheres[i].turn.T
+    force = np.zeros((len(spheres), 3))
+    np.add.at(force, owner, FORCE_UNIT * forces.reshape(-1, 3))
+    residual = float(residuals[-1]) if residuals else 0.0
+    return SceneSolution(force, spheres, traction, len(residuals), residual)
