@@ -1,4 +1,4 @@
-"""Fixed spheres in a uniform Stokes flow by boundary elements on gmsh meshes, with an error estimate.
+"""Fixed spheres in a uniform Stokes flow by boundary elements on gmsh meshes, and their errors.
 
 A scene is solved on two levels of meshes. Every part of a level is coarser than that of the next:
 elements, grading, quadrature, the points through which far spheres meet. So the difference of
@@ -9,25 +9,36 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import lu_factor, lu_solve
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import LinearOperator, gmres
 
-from dustfall.spheres import centre_distances
+from dustfall.solution import Solution, Status
+from dustfall.spheres import (
+    centre_distances,
+    checked_centres,
+    checked_tolerance,
+    flow_direction,
+)
 from dustfall.stokes.elements.mesh import SphereMesh
 from dustfall.stokes.elements.near_pairs import near_coupling, side
 from dustfall.stokes.elements.single_layer import put_block, stokeslet
 from dustfall.stokes.elements.templates import (
+    LEVELS,
     MOST_DEGREE,
     Exchange,
     Level,
     Template,
     gradings_for,
+    template,
     template_facing,
 )
-from dustfall.units import FORCE_UNIT, RADIUS
+from dustfall.units import CONTACT, FORCE_UNIT, RADIUS, STOKES_DRAG
 
 MOST_ITERATIONS = 300
+
+NARROWEST_GAP = 1e-5
+"""Smallest distance of two surfaces [d_p] that the gradings of templates serve."""
 
 SHARE = 0.1
 """Part of a level's accuracy that the quadrature of near pairs, and the exchange of far ones, may
@@ -94,20 +105,19 @@ class Cluster:
         for i, sphere in enumerate(spheres):
             matrix[ends[i] : ends[i + 1], ends[i] : ends[i + 1]] = sphere.template.matrix
             for j in np.flatnonzero(near[i, :i]):
-                # cho_factor reads the lower half alone.
-                matrix[ends[i] : ends[i + 1], ends[j] : ends[j + 1]] = _near_block(
-                    sphere, spheres[j], level
-                )
+                block = _near_block(sphere, spheres[j], level)
+                matrix[ends[i] : ends[i + 1], ends[j] : ends[j + 1]] = block
+                matrix[ends[j] : ends[j + 1], ends[i] : ends[i + 1]] = block.T
         self._ends = ends[1:-1] // 3
         self._point_ends = np.cumsum([len(sphere.exchange.points) for sphere in spheres])[:-1]
-        self._factor = cho_factor(matrix, lower=True, overwrite_a=True, check_finite=False)
+        self._factor = lu_factor(matrix, overwrite_a=True, check_finite=False)
 
     def tractions(self, velocity) -> list[np.ndarray]:
         """Tractions of the nodes of each sphere, seen by its template."""
         own = np.split(velocity, self._point_ends)
         pairs = zip(self.spheres, own, strict=True)
         load = np.concatenate([sphere.loads(u) for sphere, u in pairs])
-        traction = cho_solve(self._factor, load.ravel(), check_finite=False)
+        traction = lu_solve(self._factor, load.ravel(), check_finite=False)
         return np.split(traction.reshape(-1, 3), self._ends)
 
     def forces(self, velocity) -> np.ndarray:
@@ -134,16 +144,16 @@ def mesh_scene(centres, level: Level):
     centres: (n, 3) [d_p]. Returns the spheres and which pairs are near, (n, n).
     """
     distance = centre_distances(centres)
-    gap = distance - 1.0
+    gap = distance - CONTACT
     degrees = _exchange_degrees(distance, level.accuracy)
     near = (degrees > MOST_DEGREE) & np.isfinite(distance)
     spheres = []
     for i in range(len(centres)):
         close = np.flatnonzero(near[i])
         directions = (centres[close] - centres[i]) / distance[i, close, None]
-        template, turn = template_facing(level, directions, gradings_for(gap[i, close]))
+        own, turn = template_facing(level, directions, gradings_for(gap[i, close]))
         degree = int(np.where(near[i], 1, degrees[i]).max())
-        spheres.append(MeshedSphere(template, centres[i], turn, template.exchange(degree)))
+        spheres.append(MeshedSphere(own, centres[i], turn, own.exchange(degree)))
     return spheres, near
 
 
@@ -183,23 +193,82 @@ def _point_coupling(points, owner, near):
 
 
 @dataclass(frozen=True, eq=False)
-class SceneSolution:
-    """A scene solved on one level of meshes.
+class MeshSolution(Solution):
+    """A `Solution` with the meshes that it was found on.
 
-    force: (n, 3) [Re_p c_D]. spheres: as meshed. traction: for each sphere (nodes, 3), at the
-    vertices and then at the middles of the edges of its mesh [mu U / d_p], up to a pressure inside
-    each sphere that nothing determines. residual: relative, of the preconditioned system.
+    spheres: as meshed. traction: of each sphere (nodes, 3), at the vertices of its mesh and then at
+    the middles of the edges [mu U / d_p]; its normal part has no mean, because no pressure inside a
+    sphere moves the fluid. Both are empty where the gap is too narrow to be meshed.
     """
 
-    force: np.ndarray
     spheres: list[MeshedSphere]
     traction: list[np.ndarray]
+
+
+def fixed_spheres_on_meshes(centres, flow=(0.0, 1.0, 0.0), tolerance: float = 1e-4) -> MeshSolution:
+    """Force on each of n fixed, equal spheres in a uniform Stokes flow, by boundary elements.
+
+    centres, flow: as in `forces_on_fixed_spheres`. tolerance: of the force, relative to that on an
+    isolated sphere, 1e-8 to 0.1; the levels are made for 1e-6 and more.
+    The first level meant for the tolerance is taken with the one before; if they differ too much,
+    the next as well. Where spheres are closer than NARROWEST_GAP, no force is found: it is nan, its
+    error inf. Raises ValueError for what `forces_on_fixed_spheres` refuses.
+    """
+    tolerance = checked_tolerance(tolerance, 1e-8, 0.1)
+    centres, flow = checked_centres(centres), flow_direction(flow)
+    n = len(centres)
+    gap = float(centre_distances(centres).min() - CONTACT)
+    if not np.any(flow):
+        spheres, _ = mesh_scene(centres, LEVELS[0])
+        still = [np.zeros((len(sphere.exchange.spread), 3)) for sphere in spheres]
+        return MeshSolution(
+            np.zeros((n, 3)), np.zeros(n), 0, 0.0, gap, Status.CONVERGED, spheres, still
+        )
+    if gap < NARROWEST_GAP:
+        nowhere, unknown = np.full((n, 3), np.nan), np.full(n, np.inf)
+        return MeshSolution(nowhere, unknown, 0, np.inf, gap, Status.OUT_OF_REACH, [], [])
+    strain = np.sqrt(min(gap, 1.0))
+    first = next((k for k in range(1, len(LEVELS)) if LEVELS[k].accuracy <= tolerance), -1)
+    first %= len(LEVELS)
+    coarse = _solve_on(centres, flow, LEVELS[first - 1], strain)
+    for level in LEVELS[first : first + 2]:
+        fine = _solve_on(centres, flow, level, strain)
+        # On one sphere the errors of both levels may be alike; on all of them they are not.
+        difference = np.linalg.norm(fine.force - coarse.force, axis=1).max() / STOKES_DRAG
+        error = difference + template(level).lone_error + np.sqrt(n) * fine.residual / strain
+        estimate = np.full(n, error)
+        if fine.residual > _goal(level, strain):
+            status = Status.NOT_CONVERGED
+        else:
+            reached = error <= tolerance
+            status = Status.CONVERGED if reached else Status.OUT_OF_REACH
+        if status != Status.OUT_OF_REACH:
+            break
+        coarse = fine
+    return MeshSolution(
+        fine.force, estimate, fine.iterations, fine.residual, gap, status,
+        fine.spheres, fine.traction,
+    )  # fmt: skip
+
+
+def _goal(level: Level, strain) -> float:
+    """Relative residual: the system's condition grows as the smallest gap closes."""
+    return 0.01 * level.accuracy * strain
+
+
+@dataclass(frozen=True, eq=False)
+class _OnLevel:
+    """Forces (n, 3) [Re_p c_D] of one level of meshes, and how they were found."""
+
+    force: np.ndarray
     iterations: int
     residual: float
+    spheres: list[MeshedSphere]
+    traction: list[np.ndarray]
 
 
-def solve_on_meshes(centres, flow, level: Level, goal: float) -> SceneSolution:
-    """Solve a scene on one level; centres (n, 3) [d_p], flow (3,) of length 1, goal of GMRES.
+def _solve_on(centres, flow, level: Level, strain: float) -> _OnLevel:
+    """Solve a scene on one level; centres (n, 3) [d_p], flow (3,) of length 1.
 
     Unknown are the forces at the points of all spheres: forces = answer(flow - coupling forces).
     """
@@ -232,7 +301,7 @@ def solve_on_meshes(centres, flow, level: Level, goal: float) -> SceneSolution:
     if len(bodies) > 1:
         operator = LinearOperator((len(right), len(right)), matvec=system, dtype=float)
         forces, _ = gmres(
-            operator, right, rtol=goal, restart=MOST_ITERATIONS, maxiter=1,
+            operator, right, rtol=_goal(level, strain), restart=MOST_ITERATIONS, maxiter=1,
             callback=residuals.append, callback_type="pr_norm",
         )  # fmt: skip
     velocity = np.split(undisturbed - (coupling @ forces).reshape(-1, 3), ends)
@@ -243,4 +312,4 @@ def solve_on_meshes(centres, flow, level: Level, goal: float) -> SceneSolution:
     force = np.zeros((len(spheres), 3))
     np.add.at(force, owner, FORCE_UNIT * forces.reshape(-1, 3))
     residual = float(residuals[-1]) if residuals else 0.0
-    return SceneSolution(force, spheres, traction, len(residuals), residual)
+    return _OnLevel(force, len(residuals), residual, spheres, traction)
