@@ -1,5 +1,7 @@
 """Triangular surface meshes of a sphere, made by gmsh. They know nothing of physics."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -55,6 +57,25 @@ GROWTH = 0.5
 """Edge length gained per distance from the point that a graded mesh refines towards."""
 
 
+@contextmanager
+def gmsh_session(name: str) -> Iterator[str]:
+    """A gmsh model of this name, gone at the end; a session of the caller's goes on as it was."""
+    already_running = gmsh.isInitialized()
+    if not already_running:
+        gmsh.initialize(interruptible=False)
+    model_before = gmsh.model.getCurrent()
+    gmsh.option.setNumber("General.Verbosity", 2)
+    gmsh.model.add(name)
+    try:
+        yield name
+    finally:
+        gmsh.model.remove()
+        if already_running:
+            gmsh.model.setCurrent(model_before)
+        else:
+            gmsh.finalize()
+
+
 def sphere_mesh(size: float, toward=(), finest=LARGEST_SIZE) -> SphereMesh:
     """Mesh the unit sphere with gmsh; `size` is the edge length [radii].
 
@@ -68,13 +89,7 @@ def sphere_mesh(size: float, toward=(), finest=LARGEST_SIZE) -> SphereMesh:
     if not 0.0 < size <= LARGEST_SIZE:
         raise ValueError(f"edge length {size} radii: it must lie in (0, {LARGEST_SIZE}]")
 
-    already_running = gmsh.isInitialized()
-    if not already_running:
-        gmsh.initialize(interruptible=False)
-    model_before = gmsh.model.getCurrent()
-    gmsh.option.setNumber("General.Verbosity", 2)
-    gmsh.model.add("sphere")
-    try:
+    with gmsh_session("sphere"):
         gmsh.model.occ.addSphere(0.0, 0.0, 0.0, 1.0)
         gmsh.model.occ.synchronize()
         gmsh.option.setNumber("Mesh.MeshSizeMin", min([size, *finest]))
@@ -88,12 +103,6 @@ def sphere_mesh(size: float, toward=(), finest=LARGEST_SIZE) -> SphereMesh:
         _, corners = gmsh.model.mesh.getElementsByType(
             gmsh.model.mesh.getElementType("triangle", 1)
         )
-    finally:
-        gmsh.model.remove()
-        if already_running:
-            gmsh.model.setCurrent(model_before)
-        else:
-            gmsh.finalize()
 
     vertices = coordinates.reshape(-1, 3)
     position = np.zeros(int(tags.max()) + 1, dtype=np.int64)

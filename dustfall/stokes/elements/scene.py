@@ -20,9 +20,9 @@ from dustfall.spheres import (
     checked_tolerance,
     flow_direction,
 )
+from dustfall.stokes.elements.element_pairs import coupling, side
 from dustfall.stokes.elements.mesh import SphereMesh
-from dustfall.stokes.elements.near_pairs import near_coupling, side
-from dustfall.stokes.elements.single_layer import put_block, stokeslet
+from dustfall.stokes.elements.stokeslet import put_block, stokeslet
 from dustfall.stokes.elements.templates import (
     LEVELS,
     MOST_DEGREE,
@@ -98,14 +98,14 @@ class Cluster:
     Its matrix has the templates' own on the diagonal and the near pairs' beside it.
     """
 
-    def __init__(self, spheres: list[MeshedSphere], near, level: Level):
+    def __init__(self, spheres: list[MeshedSphere], near, tolerance: float):
         self.spheres = spheres
         ends = np.cumsum([0] + [len(sphere.template.matrix) for sphere in spheres])
         matrix = np.zeros((ends[-1], ends[-1]))
         for i, sphere in enumerate(spheres):
             matrix[ends[i] : ends[i + 1], ends[i] : ends[i + 1]] = sphere.template.matrix
             for j in np.flatnonzero(near[i, :i]):
-                block = _near_block(sphere, spheres[j], level)
+                block = _near_block(sphere, spheres[j], tolerance)
                 matrix[ends[i] : ends[i + 1], ends[j] : ends[j + 1]] = block
                 matrix[ends[j] : ends[j + 1], ends[i] : ends[i + 1]] = block.T
         self._ends = ends[1:-1] // 3
@@ -126,13 +126,10 @@ class Cluster:
         return np.concatenate([sphere.forces(f) for sphere, f in pairs])
 
 
-def _near_block(target: MeshedSphere, source: MeshedSphere, level: Level) -> np.ndarray:
+def _near_block(target: MeshedSphere, source: MeshedSphere, tolerance: float) -> np.ndarray:
     """Loads of one sphere by the tractions of another, both as seen by their templates."""
     shift = target.centre - source.centre
-    gap = (np.linalg.norm(shift) - 1.0) / RADIUS
-    # Near spheres amplify by 1 / gap what they do not feel alike.
-    tolerance = SHARE * level.accuracy * min(1.0, gap)
-    block = near_coupling(side(target.mesh(), tolerance), side(source.mesh(), tolerance), shift)
+    block = coupling(side(target.mesh(), tolerance), side(source.mesh(), tolerance), shift)
     rows, columns = block.shape
     block = target.turn.T @ block.reshape(rows // 3, 3, columns)
     return (block.reshape(-1, 3) @ source.turn).reshape(rows, columns)
@@ -145,7 +142,7 @@ def mesh_scene(centres, level: Level):
     """
     distance = centre_distances(centres)
     gap = distance - CONTACT
-    degrees = _exchange_degrees(distance, level.accuracy)
+    degrees = _exchange_degrees(distance, _coupling_tolerance(distance, level))
     near = (degrees > MOST_DEGREE) & np.isfinite(distance)
     spheres = []
     for i in range(len(centres)):
@@ -157,7 +154,15 @@ def mesh_scene(centres, level: Level):
     return spheres, near
 
 
-def _exchange_degrees(distance, accuracy) -> np.ndarray:
+def _coupling_tolerance(distance, level: Level) -> float:
+    """How well a pair has to be coupled: near spheres amplify what they do not feel alike.
+
+    By about 1 / gap, and all pairs of the scene do it to the nearest one.
+    """
+    return SHARE * level.accuracy * min(1.0, (distance.min() - CONTACT) / RADIUS)
+
+
+def _exchange_degrees(distance, tolerance) -> np.ndarray:
     """Degree (n, n) that each pair has to exchange.
 
     Harmonics of degree l fall off as exp(-xi l) from one sphere to another, cosh(xi) = distance /
@@ -168,10 +173,9 @@ def _exchange_degrees(distance, accuracy) -> np.ndarray:
     xi = np.arccosh(distance)
     nearest = xi.min(axis=1)
     excited = np.minimum(nearest[:, None], nearest[None, :])
-    goal = SHARE * accuracy * min(1.0, (distance.min() - 1.0) / RADIUS)
     degrees = np.zeros((n, n))
     apart = ~np.eye(n, dtype=bool)
-    degrees[apart] = np.ceil(np.log(1.0 / goal) / (xi + excited)[apart] - 1.0)
+    degrees[apart] = np.ceil(np.log(1.0 / tolerance) / (xi + excited)[apart] - 1.0)
     return np.maximum(degrees, 1.0)
 
 
@@ -235,7 +239,8 @@ def fixed_spheres_on_meshes(centres, flow=(0.0, 1.0, 0.0), tolerance: float = 1e
         fine = _solve_on(centres, flow, level, strain)
         # On one sphere the errors of both levels may be alike; on all of them they are not.
         difference = np.linalg.norm(fine.force - coarse.force, axis=1).max() / STOKES_DRAG
-        error = difference + template(level).lone_error + np.sqrt(n) * fine.residual / strain
+        error = difference + template(level).lone_error + SHARE * level.accuracy
+        error += np.sqrt(n) * fine.residual / strain
         estimate = np.full(n, error)
         if fine.residual > _goal(level, strain):
             status = Status.NOT_CONVERGED
@@ -272,20 +277,21 @@ def _solve_on(centres, flow, level: Level, strain: float) -> _OnLevel:
 
     Unknown are the forces at the points of all spheres: forces = answer(flow - coupling forces).
     """
+    tolerance = _coupling_tolerance(centre_distances(centres), level)
     spheres, near = mesh_scene(centres, level)
     _, cluster = connected_components(near, directed=False)
     # Spheres of a cluster stand side by side.
     order = np.argsort(cluster, kind="stable")
     members = np.split(order, np.cumsum(np.bincount(cluster))[:-1])
     bodies = [
-        Cluster([spheres[i] for i in own], near[np.ix_(own, own)], level)
+        Cluster([spheres[i] for i in own], near[np.ix_(own, own)], tolerance)
         if len(own) > 1
         else LoneSphere(spheres[own[0]])
         for own in members
     ]
     points = [spheres[i].points() for i in order]
     owner = np.repeat(order, [len(own) for own in points])
-    coupling = _point_coupling(np.concatenate(points), owner, near)
+    exchanged = _point_coupling(np.concatenate(points), owner, near)
     ends = np.cumsum([sum(len(spheres[i].exchange.points) for i in own) for own in members])[:-1]
 
     def answer(velocity):
@@ -293,7 +299,7 @@ def _solve_on(centres, flow, level: Level, strain: float) -> _OnLevel:
         return np.concatenate([body.forces(u) for body, u in parts]).ravel()
 
     def system(forces):
-        return forces + answer((coupling @ forces).reshape(-1, 3))
+        return forces + answer((exchanged @ forces).reshape(-1, 3))
 
     undisturbed = np.tile(flow, (len(owner), 1))
     right = answer(undisturbed)
@@ -304,7 +310,7 @@ def _solve_on(centres, flow, level: Level, strain: float) -> _OnLevel:
             operator, right, rtol=_goal(level, strain), restart=MOST_ITERATIONS, maxiter=1,
             callback=residuals.append, callback_type="pr_norm",
         )  # fmt: skip
-    velocity = np.split(undisturbed - (coupling @ forces).reshape(-1, 3), ends)
+    velocity = np.split(undisturbed - (exchanged @ forces).reshape(-1, 3), ends)
     traction = [np.empty(0)] * len(spheres)
     for own, body, u in zip(members, bodies, velocity, strict=True):
         for i, f in zip(own, body.tractions(u), strict=True):

@@ -1,8 +1,8 @@
 """Meshed spheres, assembled and inverted once: what every sphere of every scene is a copy of.
 
 A sphere far from all others takes the plain template of a level; one that nearly touches another
-takes the template that is graded towards its north pole, turned until the pole faces the gap. Only
-a sphere with several narrow gaps needs a mesh of its own.
+takes the template that is graded towards one point of its equator, turned until the point faces the
+gap. Only a sphere with several narrow gaps needs a mesh of its own.
 
 Spheres that are not close exchange what a few points carry. With the points x_p and weights w_p of
 Lebedev's rule (1976), exact to degree 2 L, any field on the sphere is taken through its values at
@@ -29,21 +29,21 @@ from dustfall.units import FORCE_UNIT, RADIUS, STOKES_DRAG
 class Level(NamedTuple):
     """How finely a sphere is discretised.
 
-    size: edge length [radii]. accuracy: relative error of forces that it is meant for. quadrature:
-    `self_interaction`'s singular and regular points a direction and separation.
+    size: edge length [radii]. accuracy: relative error of forces that it is meant for.
+    singular_points: as in `self_interaction`.
     """
 
     size: float
     accuracy: float
-    quadrature: tuple[int, int, float]
+    singular_points: int
 
 
 LEVELS = (
-    Level(1.3, 1e-3, (5, 4, 0.5)),
-    Level(0.85, 3e-4, (5, 4, 0.5)),
-    Level(0.65, 1e-4, (5, 4, 0.5)),
-    Level(0.5, 1e-5, (5, 4, 1.0)),
-    Level(0.35, 1e-6, (6, 5, 1.0)),
+    Level(1.3, 1e-3, 5),
+    Level(0.85, 3e-4, 5),
+    Level(0.65, 1e-4, 5),
+    Level(0.5, 1e-5, 5),
+    Level(0.35, 1e-6, 6),
 )
 """34, 48, 80, 154 and 254 elements where no gap is narrow."""
 
@@ -85,7 +85,7 @@ class Template:
 
     def __init__(self, mesh: SphereMesh, level: Level):
         self.mesh, self.level = mesh, level
-        self.matrix = self_interaction(mesh, *level.quadrature)
+        self.matrix = self_interaction(mesh, level.singular_points, 0.01 * level.accuracy)
         normals = nodal_integrals(mesh, lambda n: n).ravel()
         self.matrix += np.outer(normals, normals)
         self._exchanges: dict[int, Exchange] = {}
@@ -133,13 +133,16 @@ MOST_DEGREE = LEBEDEV_DEGREES[-3] // 2
 """Largest degree by which two spheres exchange fields; closer pairs are integrated in full."""
 
 
+FRONT = np.array([-1.0, 0.0, 0.0])
+"""Where templates are graded: opposite the seam of gmsh's sphere and off its poles, next to which
+elements are thin."""
+
+
 @cache
 def template(level: Level, grading: int = 0) -> Template:
-    """The template whose edges are halved `grading` times at the north pole (0: nowhere)."""
-    toward = [(0.0, 0.0, 1.0)] if grading else []
-    return Template(
-        sphere_mesh(level.size, toward, [level.size / 2.0**grading] * len(toward)), level
-    )
+    """The template whose edges are halved `grading` times at FRONT (0: nowhere)."""
+    toward = [FRONT] if grading else []
+    return Template(sphere_mesh(level.size, toward, level.size / 2.0**grading), level)
 
 
 def template_facing(level: Level, directions, gradings) -> tuple[Template, np.ndarray]:
@@ -147,22 +150,20 @@ def template_facing(level: Level, directions, gradings) -> tuple[Template, np.nd
 
     directions: (k, 3) unit vectors to the spheres that are close; gradings: (k,) halvings there.
     """
-    directions, gradings = np.asarray(directions, float).reshape(-1, 3), np.asarray(gradings)
+    gradings = np.asarray(gradings)
     graded = np.flatnonzero(gradings)
     if len(graded) == 0:
         return template(level), np.eye(3)
+    directions, gradings = np.asarray(directions)[graded], gradings[graded]
+    finest = np.argmax(gradings)
+    turn = Rotation.align_vectors([directions[finest]], [FRONT])[0].as_matrix()
     if len(graded) == 1:
-        return template(level, int(gradings[graded[0]])), _from_north(directions[graded[0]])
-    mesh = sphere_mesh(level.size, directions[graded], level.size / 2.0 ** gradings[graded])
-    return Template(mesh, level), np.eye(3)
+        return template(level, int(gradings[0])), turn
+    mesh = sphere_mesh(level.size, directions @ turn, level.size / 2.0**gradings)
+    return Template(mesh, level), turn
 
 
 def gradings_for(gap) -> np.ndarray:
     """Halvings of the edge length that gaps [d_p] ask for."""
     edge = RESOLVED * np.sqrt(np.asarray(gap) / RADIUS)
     return np.clip(np.ceil(-np.log2(edge)), 0, MOST_GRADINGS).astype(int)
-
-
-def _from_north(direction) -> np.ndarray:
-    """A rotation (3, 3) of the north pole to a unit vector."""
-    return Rotation.align_vectors([direction], [(0.0, 0.0, 1.0)])[0].as_matrix()

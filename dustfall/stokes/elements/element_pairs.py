@@ -1,4 +1,4 @@
-"""Galerkin coupling of two spheres that nearly touch: each pair of elements integrated in full.
+"""Galerkin coupling of two surfaces: each pair of elements that do not touch integrated in full.
 
 The inner integral, over a source element seen from one point, takes as many points as their
 distance asks for, and the element is quartered where no rule is enough. So does the outer one, over
@@ -13,13 +13,15 @@ from numba import njit
 
 from dustfall.stokes.elements.element import (
     MOST_HALVINGS,
+    SHAPES,
     centre_and_reach,
     place_points,
     quarter,
+    shape_functions,
 )
 from dustfall.stokes.elements.mesh import SphereMesh
 from dustfall.stokes.elements.quadrature import triangle_rule
-from dustfall.stokes.elements.single_layer import SHAPES, put_block, shape_functions
+from dustfall.stokes.elements.stokeslet import put_block
 from dustfall.units import RADIUS
 
 FEWEST_POINTS, MOST_POINTS = 2, 8
@@ -196,7 +198,7 @@ def _place_part(corners, part, share, rule, weights, points, shapes):
 
 
 @njit(cache=True)
-def _couple(target, source, shift):
+def _couple(target, source, shift, skip):
     """Six entries of G for each pair of nodes, (n, m, 6); shift: centre target - centre source."""
     entries = np.zeros((target.count, source.count, 6))
     last = len(source.far) - 1
@@ -208,6 +210,8 @@ def _couple(target, source, shift):
     inner, block = np.empty((SHAPES, 6)), np.empty((SHAPES, SHAPES, 6))
     for e in range(len(target.corners)):
         for f in range(len(source.corners)):
+            if skip[e, f]:
+                continue
             block[:] = 0.0
             x = target.centre[e, 0] + shift[0] - source.centre[f, 0]
             y = target.centre[e, 1] + shift[1] - source.centre[f, 1]
@@ -274,12 +278,15 @@ def _as_matrix(entries, scale):
     return matrix
 
 
-def near_coupling(target: Side, source: Side, shift) -> np.ndarray:
+def coupling(target: Side, source: Side, shift, skip=None) -> np.ndarray:
     """Velocity on one sphere by the traction on another, (3n, 3m), tested with shape functions.
 
-    shift: (3,) centre of the target seen from that of the source [d_p]; mu = 1.
+    shift: (3,) centre of the target seen from that of the source [d_p]; mu = 1. skip: (e, f), pairs
+    of elements that are left out, as those that touch must be.
     Raises ValueError if the gap is below what quartering an element can resolve.
     """
+    if skip is None:
+        skip = np.zeros((len(target.corners), len(source.corners)), dtype=np.bool_)
     shift = np.asarray(shift, dtype=float) / RADIUS
     # Two areas and one 1/r.
-    return _as_matrix(_couple(target, source, shift), RADIUS**3 / (8.0 * np.pi))
+    return _as_matrix(_couple(target, source, shift, skip), RADIUS**3 / (8.0 * np.pi))
