@@ -1,7 +1,7 @@
-"""A solved scene as a mesh file: curved triangles with traction and pressure, for gmsh and ParaView.
+"""A solved scene as a mesh file with traction and pressure, for gmsh and ParaView.
 
-Each element is a quadratic triangle, whose six nodes lie on the sphere. `.msh` is gmsh's own format,
-with one surface for each sphere; `.vtu` is VTK's unstructured grid.
+Each element is a quadratic triangle, whose six nodes lie on the sphere. `.msh` is gmsh's own
+format, with one surface for each sphere; `.vtu` is VTK's unstructured grid.
 """
 
 from pathlib import Path
@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 
 import gmsh
 import numpy as np
+import pandas as pd
 
 from dustfall.files import atomic
 from dustfall.stokes.elements.mesh import gmsh_session
@@ -25,8 +26,8 @@ class SceneMesh(NamedTuple):
     """All elements of a scene.
 
     points: (n, 3) [d_p]. triangles: (e, 6), numbers of points. sphere: (e,), whose element it is.
-    traction: (n, 3) [mu U / d_p]. pressure: (n,), its part along the inward normal, which on a rigid
-    sphere is the pressure less its mean over that sphere.
+    traction: (n, 3) [mu U / d_p]. pressure: (n,), its part along the inward normal, which on a
+    rigid sphere is the pressure less its mean over that sphere.
     """
 
     points: np.ndarray
@@ -64,6 +65,28 @@ def scene_mesh(solution: MeshSolution) -> SceneMesh:
     )
 
 
+def element_table(solution: MeshSolution) -> pd.DataFrame:
+    """Outlines of all elements, for a figure: one row a node, going round each element.
+
+    Columns: sphere, element, x, y, z [d_p], and pressure [mu U / d_p], the mean of the element's.
+    """
+    mesh = scene_mesh(solution)
+    around = mesh.triangles[:, [0, 3, 1, 4, 2, 5]]
+    count = len(around)
+    x, y, z = mesh.points[around.ravel()].T
+    return pd.DataFrame(
+        {
+            "sphere": np.repeat(mesh.sphere, 6),
+            "element": np.repeat(np.arange(count), 6),
+            "x": x,
+            "y": y,
+            "z": z,
+            # On a quadratic triangle the middles of the edges alone carry the mean.
+            "pressure": np.repeat(mesh.pressure[mesh.triangles[:, 3:]].mean(axis=1), 6),
+        }
+    )
+
+
 def write_scene_mesh(path, solution: MeshSolution) -> None:
     """Write a solved scene as `.msh` or `.vtu`; ValueError for another ending."""
     writers = {".msh": _write_msh, ".vtu": _write_vtu}
@@ -87,6 +110,8 @@ def _write_msh(path: str, mesh: SceneMesh) -> None:
                 tag, GMSH_QUADRATIC_TRIANGLE, [], numbers[own].ravel()
             )
         gmsh.write(path)
+        # Each view would write the mesh once more.
+        gmsh.option.setNumber("PostProcessing.SaveMesh", 0)
         for name, values in (
             ("traction [mu U / d_p]", mesh.traction),
             ("pressure [mu U / d_p]", mesh.pressure[:, None]),
