@@ -12,6 +12,9 @@ from dustfall.figures.style import DOUBLE, letter, new_figure, require, styled
 VIEW = (18.0, -50.0)
 """Elevation and azimuth [degrees] from which scenes are seen."""
 
+RIM = 0.35
+"""Cosine of the angle behind the outline of a sphere up to which elements are drawn."""
+
 COLOURS = "RdBu_r"
 """Diverging: the mean pressure of a sphere is white."""
 
@@ -60,7 +63,8 @@ def _draw(ax, rows, colours):
     middle = nodes.mean(axis=1)
     centre = np.array([middle[sphere == own].mean(axis=0) for own in np.unique(sphere)])
     outward = middle - centre[np.searchsorted(np.unique(sphere), sphere)]
-    seen = outward @ eye > 0.0
+    # Elements at the rim are half in sight.
+    seen = outward @ eye > -RIM * np.linalg.norm(outward, axis=1)
     ax.add_collection3d(
         Poly3DCollection(
             nodes[seen], facecolors=colours.to_rgba(pressure[seen]), edgecolors="0.25",

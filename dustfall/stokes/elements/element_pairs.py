@@ -33,7 +33,8 @@ class Side(NamedTuple):
     """One sphere of a pair with the quadrature that a tolerance asks for.
 
     corners: (e, 3, 3). nodes: (e, 6). count: number of nodes. centre: (e, 3); reach: (e,) from it
-    to the farthest corner. far: distance, in reaches, from which each rule is enough. rules,
+    to the farthest corner. far: distance, in reaches, from which each rule is enough. fewest: (e,),
+    number of the smallest rule that integrates the shape functions of the element. rules,
     weights: the rules. points: by rule, (e, 3, q); shapes: by rule, (e, 6, q), shape functions
     times weights. outer: number of the largest rule for the outer integral.
     """
@@ -44,6 +45,7 @@ class Side(NamedTuple):
     centre: np.ndarray
     reach: np.ndarray
     far: np.ndarray
+    fewest: np.ndarray
     rules: tuple
     weights: tuple
     points: tuple
@@ -63,6 +65,8 @@ def side(mesh: SphereMesh, tolerance: float) -> Side:
     rules, weights = zip(*[triangle_rule(int(n)) for n in counts], strict=True)
     placed = [_on_elements(corners, *r) for r in zip(rules, weights, strict=True)]
     points, shapes = zip(*placed, strict=True)
+    moments = np.array([shape.sum(axis=2) for shape in shapes])
+    missed = np.abs(moments - moments[-1]).max(axis=2) / moments[-1].sum(axis=1)
     return Side(
         corners=corners,
         nodes=mesh.quadratic_nodes,
@@ -70,6 +74,8 @@ def side(mesh: SphereMesh, tolerance: float) -> Side:
         centre=np.array([c for c, _ in size]),
         reach=np.array([r for _, r in size]),
         far=np.sinh(np.log(1.0 / tolerance) / (2.0 * counts)),
+        # However far the target, a projected element needs points enough for its own area.
+        fewest=np.argmax(missed <= tolerance, axis=0),
         rules=rules,
         weights=weights,
         points=points,
@@ -139,9 +145,9 @@ def _add_element(x, y, z, points, shapes, count, g, block):
 
 
 @njit(cache=True, inline="always")
-def _sufficient_rule(distance, reach, far):
+def _sufficient_rule(distance, reach, far, fewest):
     """Number of the smallest rule fit for a target this far away; len(far) if none is."""
-    number = 0
+    number = fewest
     while number < len(far) and distance - reach < far[number] * reach:
         number += 1
     return number
@@ -217,7 +223,10 @@ def _couple(target, source, shift, skip):
             y = target.centre[e, 1] + shift[1] - source.centre[f, 1]
             z = target.centre[e, 2] + shift[2] - source.centre[f, 2]
             distance = np.sqrt(x * x + y * y + z * z) - source.reach[f]
-            outer = min(target.outer, _sufficient_rule(distance, target.reach[e], target.far))
+            outer = min(
+                target.outer,
+                _sufficient_rule(distance, target.reach[e], target.far, target.fewest[e]),
+            )
             outer_points, outer_shapes = target.points[outer][e], target.shapes[outer][e]
             for p in range(outer_points.shape[1]):
                 x = outer_points[0, p] + shift[0]
@@ -229,7 +238,7 @@ def _couple(target, source, shift, skip):
                     + (y - source.centre[f, 1]) ** 2
                     + (z - source.centre[f, 2]) ** 2
                 )
-                rule = _sufficient_rule(distance, source.reach[f], source.far)
+                rule = _sufficient_rule(distance, source.reach[f], source.far, source.fewest[f])
                 if rule <= last:
                     own_points, own_shapes = source.points[rule][f], source.shapes[rule][f]
                     _add_element(x, y, z, own_points, own_shapes, own_points.shape[1], g, inner)
@@ -239,7 +248,7 @@ def _couple(target, source, shift, skip):
                         top -= 1
                         part, depth = stack[top].copy(), level[top]
                         distance, reach = _part_size(source.corners[f], part, x, y, z, own)
-                        rule = _sufficient_rule(distance, reach, source.far)
+                        rule = _sufficient_rule(distance, reach, source.far, 0)
                         if rule <= last:
                             weights = source.weights[rule]
                             _place_part(

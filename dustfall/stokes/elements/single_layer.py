@@ -110,7 +110,7 @@ def _add_touching_pairs(matrix, corners, dofs, shared, order_x, order_y, rules):
             _scatter(matrix, dofs[e], dofs[f], block, scale, e != f)
 
 
-def self_interaction(mesh: SphereMesh, singular: int = 6, tolerance: float = 1e-7) -> np.ndarray:
+def self_interaction(mesh: SphereMesh, singular: int = 6, tolerance: float = 1e-8) -> np.ndarray:
     """Single-layer matrix of one sphere, (3n, 3n), symmetric; row 3a + i is node a, direction i.
 
     singular: Gauss points a direction where elements touch. tolerance: relative error of an
