@@ -304,7 +304,8 @@ def _solve_on(centres, flow, level: Level, strain: float) -> _OnLevel:
     undisturbed = np.tile(flow, (len(owner), 1))
     right = answer(undisturbed)
     forces, residuals = right, []
-    if len(bodies) > 1:
+    # Spheres of a cluster that are not near to each other meet here too.
+    if exchanged.any():
         operator = LinearOperator((len(right), len(right)), matvec=system, dtype=float)
         forces, _ = gmres(
             operator, right, rtol=_goal(level, strain), restart=MOST_ITERATIONS, maxiter=1,

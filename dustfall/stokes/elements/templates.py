@@ -12,7 +12,7 @@ p^2 Stokeslets, and no field of the mesh is replaced by one of harmonics within 
 """
 
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -138,6 +138,14 @@ FRONT = np.array([-1.0, 0.0, 0.0])
 elements are thin."""
 
 
+DIGITS = 6
+"""Decimals of a direction by which meshes with several fine spots are told apart: far below an
+edge, far above rounding."""
+
+KEPT = 12
+"""Meshes with several fine spots that are kept, 10 to 30 MB each: those of a scene on two levels."""
+
+
 @cache
 def template(level: Level, grading: int = 0) -> Template:
     """The template whose edges are halved `grading` times at FRONT (0: nowhere)."""
@@ -154,13 +162,25 @@ def template_facing(level: Level, directions, gradings) -> tuple[Template, np.nd
     graded = np.flatnonzero(gradings)
     if len(graded) == 0:
         return template(level), np.eye(3)
+    graded = graded[np.argsort(-gradings[graded], kind="stable")]
     directions, gradings = np.asarray(directions)[graded], gradings[graded]
-    finest = np.argmax(gradings)
-    turn = Rotation.align_vectors([directions[finest]], [FRONT])[0].as_matrix()
+    first = directions[0]
     if len(graded) == 1:
+        turn = Rotation.align_vectors([first], [FRONT])[0].as_matrix()
         return template(level, int(gradings[0])), turn
-    mesh = sphere_mesh(level.size, directions @ turn, level.size / 2.0**gradings)
-    return Template(mesh, level), turn
+    # In a frame of the directions' own, spheres that are neighboured alike share a mesh.
+    side = np.cross(first, directions[1])
+    if np.linalg.norm(side) < 1e-6:
+        side = np.cross(first, np.eye(3)[np.argmin(np.abs(first))])
+    side /= np.linalg.norm(side)
+    turn = np.column_stack([-first, np.cross(side, -first), side])
+    toward = np.round(directions @ turn, DIGITS)
+    return _template_of_its_own(level, tuple(map(tuple, toward)), tuple(map(int, gradings))), turn
+
+
+@lru_cache(maxsize=KEPT)
+def _template_of_its_own(level: Level, toward, gradings) -> Template:
+    return Template(sphere_mesh(level.size, toward, level.size / 2.0 ** np.array(gradings)), level)
 
 
 def gradings_for(gap) -> np.ndarray:
