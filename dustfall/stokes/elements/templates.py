@@ -143,7 +143,7 @@ DIGITS = 6
 edge, far above rounding."""
 
 KEPT = 12
-"""Meshes with several fine spots that are kept, 10 to 30 MB each: those of a scene on two levels."""
+"""Meshes with several fine spots that are kept, 10 to 30 MB each: a scene's on two levels."""
 
 
 @cache
