@@ -95,8 +95,8 @@ def forces_in_outer_sphere(
         for j in numbers:
             elements = surfaces[j].elements
             # Normals of a particle point into the fluid, those of the outer sphere out of it.
-            side = -1.0 if surfaces[j] is outer else 1.0
-            corner_velocity = np.broadcast_to(side * moving[j], elements.corners.shape).copy()
+            sign = -1.0 if surfaces[j] is outer else 1.0
+            corner_velocity = np.broadcast_to(sign * moving[j], elements.corners.shape).copy()
             load += double_layer(seen(i, j), i == j, elements, corner_velocity)
             if i != j:
                 blocks[i, j] = single_layer(seen(i, j), False, elements)
