@@ -259,7 +259,7 @@ def _couple(target, source, shift, skip):
                             continue
                         if depth == MOST_HALVINGS:
                             raise ValueError(
-                                "spheres too close: an element was quartered too often"
+                                "gap too narrow: an element was quartered too often"
                             )
                         for k in range(4):
                             quarter(part, k, stack[top])

@@ -126,12 +126,12 @@ def _lebedev_degree(least: int) -> int:
     return next(d for d in LEBEDEV_DEGREES if d >= least)
 
 
-LEBEDEV_DEGREES = (3, 5, 7, 9, 11, 15, 17, 19, 21, 23, 29, 31, 35)
-"""Degrees of Lebedev's rules, up to 434 points, without those that have negative weights."""
+LEBEDEV_DEGREES = (3, 5, 7, 9, 11, 15, 17, 19, 21)
+"""Degrees of Lebedev's rules, 6 to 170 points, without that of 13, which has negative weights."""
 
-MOST_DEGREE = LEBEDEV_DEGREES[-3] // 2
-"""Largest degree by which two spheres exchange fields; closer pairs are integrated in full."""
-
+MOST_DEGREE = LEBEDEV_DEGREES[-1] // 2
+"""Largest degree by which two spheres exchange fields: closer pairs are integrated in full, which
+is cheaper by then."""
 
 FRONT = np.array([-1.0, 0.0, 0.0])
 """Where templates are graded: opposite the seam of gmsh's sphere and off its poles, next to which
