@@ -52,6 +52,8 @@ rule all:
         "results/config.yaml",
         "results/dataset/summary.csv",
         "results/dataset/summary.json",
+        "results/analysis/audit.csv",
+        MESHES,
         "results/model/evaluation.csv",
         "results/analysis/independence_of_n.csv",
         "results/analysis/neighbour_changes.csv",

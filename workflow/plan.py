@@ -55,6 +55,25 @@ def shard_scenes(config: dict, law: str, shard: str) -> tuple[int, int]:
     return first, min(first + size, config["scenes"]["number"][law])
 
 
+def first_shards(config: dict) -> list[str]:
+    """Names of the first shard of each radial law that has scenes."""
+    return [name for name in shards(config) if name.endswith(f"-{0:04d}")]
+
+
+def shard_of(config: dict, law: str, scene: str) -> str:
+    """Name of the shard that a scene is in."""
+    return f"{law}-{int(scene) // config['scenes']['shard_size']:04d}"
+
+
+def kept_meshes(config: dict) -> list[str]:
+    """Names of the scenes whose meshes are kept, like uniform-000000: the first of each law."""
+    return [
+        f"{law}-{scene:06d}"
+        for law, number in config["scenes"]["number"].items()
+        for scene in range(min(number, config["stokes"]["keep_meshes"]))
+    ]
+
+
 def trials(config: dict) -> list[str]:
     """Names of all trials of the sweep, like streamwise/40-40_30-30-30."""
     return [

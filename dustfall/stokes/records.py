@@ -4,7 +4,7 @@ import numpy as np
 
 from dustfall.columns import Column, write_columns
 from dustfall.stokes.plan import plan_scene
-from dustfall.stokes.solve import solve
+from dustfall.stokes.solve import fixed_spheres, solve
 
 COLUMNS = {
     "scene": Column("1", "number of the scene within its radial law"),
@@ -14,28 +14,39 @@ COLUMNS = {
     "residual": Column("1", "relative to the right-hand side"),
     "minimum_gap": Column("d_p", "smallest distance of two surfaces"),
     "status": Column("", "how the solve ended"),
-    "degrees": Column("1", "highest degree of the harmonics that each pair of spheres exchanges"),
+    "degrees": Column(
+        "1", "highest degree of the harmonics that each pair exchanges, 0 by methods without them"
+    ),
 }
 """Columns of a shard of force records."""
 
 
-def solve_shard(neighbours, tolerance: float, progress=None) -> dict[str, np.ndarray]:
+def solve_shard(
+    neighbours, tolerance: float, progress=None, method: str = "multipole"
+) -> dict[str, np.ndarray]:
     """Solve each scene in the unit flow along y; one array for each of COLUMNS but the scene.
 
     neighbours: (m, k, 3) [d_p], around a reference sphere at the origin, which comes first in what
     is returned. With n = k + 1, force is (m, n, 3), error_estimate (m, n) and degrees (m, n, n);
-    the other arrays are (m,), status of str.
+    the other arrays are (m,), status of str. method: as in `fixed_spheres`.
     """
     reference = np.zeros((1, 3))
-    plans, solutions = [], []
+    degrees, solutions = [], []
     for scene in neighbours:
-        plans.append(plan_scene(np.concatenate([reference, scene]), tolerance))
-        solutions.append(solve(plans[-1], tolerance=tolerance))
+        centres = np.concatenate([reference, scene])
+        if method == "multipole":
+            plan = plan_scene(centres, tolerance)
+            solution = solve(plan, tolerance=tolerance)
+            degrees.append(plan.degrees)
+        else:
+            solution = fixed_spheres(centres, tolerance=tolerance, method=method)
+            degrees.append(np.zeros((len(centres), len(centres)), dtype=int))
+        solutions.append(solution)
         if progress is not None:
             progress(len(solutions), len(neighbours))
     names = [name for name in COLUMNS if name not in ("scene", "degrees")]
     records = {name: np.array([getattr(s, name) for s in solutions]) for name in names}
-    return records | {"degrees": np.array([plan.degrees for plan in plans])}
+    return records | {"degrees": np.array(degrees)}
 
 
 def write_records(path, records: dict[str, np.ndarray], scene) -> None:

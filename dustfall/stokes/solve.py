@@ -63,7 +63,22 @@ def by_multipoles(centres, flow, tolerance) -> Solution:
     return solve(plan_scene(centres, tolerance), flow, tolerance)
 
 
-METHODS = {"multipole": by_multipoles}
+def by_elements(centres, flow, tolerance) -> Solution:
+    """Mesh a scene and solve it by boundary elements; what it returns has the meshes too."""
+    # gmsh wants libraries of a desktop, which who needs no mesh may not have.
+    from dustfall.stokes.elements.scene import fixed_spheres_on_meshes
+
+    return fixed_spheres_on_meshes(centres, flow, tolerance)
+
+
+def as_in_the_paper(centres, flow, tolerance) -> Solution:
+    """Solve a scene within an outer sphere, as the paper does, on flat elements."""
+    from dustfall.stokes.elements.outer_sphere import fixed_spheres_in_outer_sphere
+
+    return fixed_spheres_in_outer_sphere(centres, flow, tolerance)
+
+
+METHODS = {"multipole": by_multipoles, "elements": by_elements, "paper": as_in_the_paper}
 """Ways to solve a scene: functions of centres, flow and tolerance."""
 
 

@@ -23,6 +23,8 @@ FIGURES = [
     "trajectories_3d",
     "frozen_cloud",
     "mesh_study",
+    "audit",
+    "scene_meshes",
 ]
 
 
@@ -33,6 +35,9 @@ def test_the_paper_takes_the_expected_jobs_and_fewer_than_a_thousand(project):
         "configuration": 1,
         "scenes": shards,
         "stokes": shards,
+        "audit": 1,
+        # 2 scenes of each of 3 radial laws
+        "scene_mesh": 6,
         "dataset": 1,
         "data_summary": 1,
         # 12 configurations of layers for each of 2 components

@@ -4,6 +4,7 @@
 wildcard_constraints:
     law="|".join(config["scenes"]["number"]),
     shard=r"\d+",
+    scene=r"\d+",
     component="streamwise|lateral",
     model="[a-z_]+",
     layers=r"[\d-]+(_[\d-]+)?",
@@ -40,6 +41,9 @@ def figure(name, category):
 
 SHARDS = plan.shards(config)
 TRIALS = plan.trials(config)
+MESHES = expand(
+    "results/meshes/{scene}.{ending}", scene=plan.kept_meshes(config), ending=["msh", "vtu"]
+)
 CASES = plan.cases(config)
 
 # The cases of `sedimentation.model` at the Galileo number of the properties; those of them with most
@@ -92,6 +96,8 @@ FIGURES = expand(
         "trajectories_3d",
         "frozen_cloud",
         "mesh_study",
+        "audit",
+        "scene_meshes",
     ],
     ending=["png", "pdf", "csv"],
 ) + ["results/figures/settling_cloud.gif"]

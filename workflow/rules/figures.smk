@@ -281,3 +281,32 @@ rule figure_mesh_study:
         library=library("figure_mesh_study.py"),
     script:
         "../scripts/figure_mesh_study.py"
+
+
+rule figure_audit:
+    """Difference of the forces of the audit beside both error estimates."""
+    input:
+        audit="results/analysis/audit.csv",
+    output:
+        **figure("audit", "Stokes solver"),
+    log:
+        "logs/figures/audit.log",
+    params:
+        library=library("figure_audit.py"),
+    script:
+        "../scripts/figure_audit.py"
+
+
+rule figure_scene_meshes:
+    """Meshes of a dense scene and of a near contact, coloured by pressure."""
+    input:
+        scenes=expand("results/scenes/{shard}.h5", shard=plan.first_shards(config)),
+    output:
+        **figure("scene_meshes", "Stokes solver"),
+    log:
+        "logs/figures/scene_meshes.log",
+    params:
+        library=library("figure_scene_meshes.py"),
+        tolerance=config["stokes"]["tolerance"],
+    script:
+        "../scripts/figure_scene_meshes.py"

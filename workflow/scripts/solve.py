@@ -12,7 +12,8 @@ progress = joblog.start(snakemake.log[0])
 
 shard = read_columns(snakemake.input.scenes, SCENE_COLUMNS)
 tolerance, scene = snakemake.params.tolerance, shard["scene"]
-records = solve_shard(shard["neighbours"], tolerance, progress("Stokes solves", "scenes"))
+bar = progress("Stokes solves", "scenes")
+records = solve_shard(shard["neighbours"], tolerance, bar, snakemake.params.method)
 write_records(snakemake.output[0], records, scene)
 
 for k in np.flatnonzero(records["status"] != Status.CONVERGED):
@@ -22,5 +23,7 @@ for k in np.flatnonzero(records["status"] != Status.CONVERGED):
         f"{records['minimum_gap'][k]:.1e} d_p"
     )
 highest = records["degrees"].max(axis=(1, 2))
-print(f"{len(scene)} scenes; degree of the closest pair: {highest.min()} to {highest.max()}")
+print(f"{len(scene)} scenes by {snakemake.params.method}")
+if highest.any():
+    print(f"degree of the closest pair: {highest.min()} to {highest.max()}")
 print(f"{np.sum(records['status'] == Status.CONVERGED)} converged")

@@ -20,7 +20,7 @@ from dustfall.stokes.elements.element import (
 )
 from dustfall.stokes.elements.mesh import SphereMesh
 from dustfall.stokes.elements.quadrature import triangle_rule
-from dustfall.stokes.elements.single_layer import put_block, stokeslet
+from dustfall.stokes.elements.stokeslet import put_block, stokeslet
 
 MOST_POINTS = 6
 """Gauss points a direction beyond which an element is cut instead."""
@@ -141,7 +141,7 @@ def _crowded_points(target, corners, elements, parts):
     n = len(rule_weights)
     # Parts then lie, in half-widths, as far away as the largest rule asks for.
     separation = 0.5 * (elements.far[MOST_POINTS - 1] + 1.0)
-    count = parts_facing(target, 0.0, corners, elements.flat, separation, parts)
+    count = parts_facing(target, corners, elements.flat, separation, parts)
     points, barycentric = np.empty((1, count * n, 3)), np.empty((count * n, 3))
     weights = np.empty((1, count * n))
     for k in range(count):

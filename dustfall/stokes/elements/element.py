@@ -15,6 +15,20 @@ MOST_PARTS = 65536
 """Parts that one element is cut into at most."""
 
 
+SHAPES = 6
+"""Quadratic shape functions on an element: three vertices, then edges 01, 12, 20."""
+
+
+@njit(cache=True, inline="always")
+def shape_functions(l0, l1, l2, out):
+    out[0] = l0 * (2.0 * l0 - 1.0)
+    out[1] = l1 * (2.0 * l1 - 1.0)
+    out[2] = l2 * (2.0 * l2 - 1.0)
+    out[3] = 4.0 * l0 * l1
+    out[4] = 4.0 * l1 * l2
+    out[5] = 4.0 * l2 * l0
+
+
 @njit(cache=True)
 def place_points(corners, barycentric, flat, position, density):
     """Write the points (q, 3) of an element and its area per unit of quadrature weight (q,)."""
@@ -73,11 +87,11 @@ def quarter(part, k, out):
 
 
 @njit(cache=True)
-def parts_facing(target, ball, corners, flat, separation, parts):
+def parts_facing(target, corners, flat, separation, parts):
     """Cut an element until every part is at least `separation` of its widths from a target.
 
-    target: centre (3,) of a ball of radius `ball` (0: a point), in radii of the element's sphere
-    and seen from its centre. Writes barycentric corners to parts (k, 3, 3); returns their number.
+    target: (3,), in radii of the element's sphere and seen from its centre. Writes barycentric
+    corners to parts (k, 3, 3); returns their number. Raises ValueError where they do not fit.
     """
     stack = np.empty((3 * MOST_HALVINGS + 4, 3, 3))
     level = np.zeros(len(stack), dtype=np.int64)
@@ -87,9 +101,10 @@ def parts_facing(target, ball, corners, flat, separation, parts):
         top -= 1
         part, depth = stack[top].copy(), level[top]
         centre, reach = centre_and_reach(corners, part, flat)
-        distance = np.sqrt(np.sum((target - centre) ** 2)) - ball
-        room = depth < MOST_HALVINGS and count + top + 4 <= len(parts)
-        if distance < separation * 2.0 * reach and room:
+        distance = np.sqrt(np.sum((target - centre) ** 2))
+        if distance < separation * 2.0 * reach:
+            if depth == MOST_HALVINGS or count + top + 4 > len(parts):
+                raise ValueError("target too close to an element: it was quartered too often")
             for k in range(4):
                 quarter(part, k, stack[top])
                 level[top] = depth + 1

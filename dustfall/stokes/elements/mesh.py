@@ -1,5 +1,7 @@
 """Triangular surface meshes of a sphere, made by gmsh. They know nothing of physics."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -55,28 +57,42 @@ GROWTH = 0.5
 """Edge length gained per distance from the point that a graded mesh refines towards."""
 
 
-def sphere_mesh(size: float, toward=(), finest: float = LARGEST_SIZE) -> SphereMesh:
-    """Mesh the unit sphere with gmsh; `size` is the edge length [radii].
-
-    toward: (k, 3) directions in which edges shrink to `finest` [radii], for spheres that nearly
-    touch there: the traction varies over sqrt(gap * radius), and edges should be no longer.
-    Raises ValueError unless 0 < size <= LARGEST_SIZE and finest is above 0.
-    """
-    if not finest > 0.0:
-        raise ValueError(f"finest edge length {finest} radii: it must be above 0")
-    if not 0.0 < size <= LARGEST_SIZE:
-        raise ValueError(f"edge length {size} radii: it must lie in (0, {LARGEST_SIZE}]")
-
+@contextmanager
+def gmsh_session(name: str) -> Iterator[str]:
+    """A gmsh model of this name, gone at the end; a session of the caller's goes on as it was."""
     already_running = gmsh.isInitialized()
     if not already_running:
         gmsh.initialize(interruptible=False)
     model_before = gmsh.model.getCurrent()
     gmsh.option.setNumber("General.Verbosity", 2)
-    gmsh.model.add("sphere")
+    gmsh.model.add(name)
     try:
+        yield name
+    finally:
+        gmsh.model.remove()
+        if already_running:
+            gmsh.model.setCurrent(model_before)
+        else:
+            gmsh.finalize()
+
+
+def sphere_mesh(size: float, toward=(), finest=LARGEST_SIZE) -> SphereMesh:
+    """Mesh the unit sphere with gmsh; `size` is the edge length [radii].
+
+    toward: (k, 3) directions in which edges shrink to `finest` [radii], one length or (k,), for
+    spheres that nearly touch there: the traction varies over sqrt(gap * radius), and edges should
+    be of this order. Raises ValueError unless 0 < size <= LARGEST_SIZE and finest is above 0.
+    """
+    finest = np.broadcast_to(np.asarray(finest, dtype=float), len(toward))
+    if not (finest > 0.0).all():
+        raise ValueError(f"finest edge lengths {finest.tolist()} radii: they must be above 0")
+    if not 0.0 < size <= LARGEST_SIZE:
+        raise ValueError(f"edge length {size} radii: it must lie in (0, {LARGEST_SIZE}]")
+
+    with gmsh_session("sphere"):
         gmsh.model.occ.addSphere(0.0, 0.0, 0.0, 1.0)
         gmsh.model.occ.synchronize()
-        gmsh.option.setNumber("Mesh.MeshSizeMin", min(finest, size))
+        gmsh.option.setNumber("Mesh.MeshSizeMin", min([size, *finest]))
         for source in ("ExtendFromBoundary", "FromPoints"):
             gmsh.option.setNumber(f"Mesh.MeshSize{source}", 0 if len(toward) else 1)
         gmsh.option.setNumber("Mesh.MeshSizeMax", size)
@@ -87,12 +103,6 @@ def sphere_mesh(size: float, toward=(), finest: float = LARGEST_SIZE) -> SphereM
         _, corners = gmsh.model.mesh.getElementsByType(
             gmsh.model.mesh.getElementType("triangle", 1)
         )
-    finally:
-        gmsh.model.remove()
-        if already_running:
-            gmsh.model.setCurrent(model_before)
-        else:
-            gmsh.finalize()
 
     vertices = coordinates.reshape(-1, 3)
     position = np.zeros(int(tags.max()) + 1, dtype=np.int64)
@@ -109,13 +119,14 @@ def sphere_mesh(size: float, toward=(), finest: float = LARGEST_SIZE) -> SphereM
 
 def _grade(toward, finest):
     """Set the edge length that grows from `finest` with the distance from points of the sphere."""
-    toward = np.asarray(toward, dtype=float)
+    toward = np.array(toward, dtype=float)
     add = gmsh.model.mesh.field.add
     fields = []
-    for x, y, z in toward / np.linalg.norm(toward, axis=1, keepdims=True):
+    toward /= np.linalg.norm(toward, axis=1, keepdims=True)
+    for (x, y, z), shortest in zip(toward, finest, strict=True):
         field = add("MathEval")
         distance = f"sqrt((x-({x}))^2+(y-({y}))^2+(z-({z}))^2)"
-        gmsh.model.mesh.field.setString(field, "F", f"{finest}+{GROWTH}*{distance}")
+        gmsh.model.mesh.field.setString(field, "F", f"{shortest}+{GROWTH}*{distance}")
         fields.append(field)
     smallest = add("Min")
     gmsh.model.mesh.field.setNumbers(smallest, "FieldsList", fields)
