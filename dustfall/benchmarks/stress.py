@@ -11,10 +11,11 @@ from dustfall.stokes.elements.mesh import SphereMesh, sphere_mesh
 from dustfall.stokes.elements.one_body import OneBody
 from dustfall.stokes.elements.single_layer import nodal_integrals, self_interaction
 from dustfall.stokes.harmonics import exact_response
+from dustfall.stokes.methods import fixed_spheres
 from dustfall.stokes.multipoles import apply_system, couple_scene, solve_scene
 from dustfall.stokes.plan import plan_scene
 from dustfall.stokes.references.exact_pairs import forces_on_two_spheres
-from dustfall.stokes.solve import fixed_spheres, response_rows, solve
+from dustfall.stokes.solve import response_rows, solve
 from dustfall.stokes.translation import translation_tables
 from dustfall.units import FORCE_UNIT, RADIUS, STOKES_DRAG
 
