@@ -7,7 +7,7 @@ import pandas as pd
 
 from dustfall.scenes import LAWS
 from dustfall.solution import Status
-from dustfall.stokes.solve import fixed_spheres
+from dustfall.stokes.methods import fixed_spheres
 from dustfall.streams import Purpose, stream
 from dustfall.units import STOKES_DRAG
 

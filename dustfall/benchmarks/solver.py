@@ -12,9 +12,9 @@ from dustfall.spheres import flow_direction
 from dustfall.stokes.elements.boundary_elements import forces_by_elements
 from dustfall.stokes.elements.mesh import sphere_mesh
 from dustfall.stokes.elements.outer_sphere import forces_in_outer_sphere
+from dustfall.stokes.methods import fixed_spheres
 from dustfall.stokes.references.fundamental_solutions import reference_forces
 from dustfall.stokes.references.multiblob import multiblob_forces
-from dustfall.stokes.solve import fixed_spheres
 from dustfall.units import STOKES_DRAG
 
 with extra("benchmarks"):

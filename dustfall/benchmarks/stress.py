@@ -12,10 +12,11 @@ from dustfall.stokes.elements.mesh import SphereMesh, sphere_mesh
 from dustfall.stokes.elements.one_body import OneBody
 from dustfall.stokes.elements.single_layer import nodal_integrals, self_interaction
 from dustfall.stokes.harmonics import exact_response
+from dustfall.stokes.methods import fixed_spheres
 from dustfall.stokes.multipoles import apply_system, couple_scene, solve_scene
 from dustfall.stokes.plan import SMALLEST_TOLERANCE, plan_scene
 from dustfall.stokes.references.exact_pairs import forces_on_two_spheres
-from dustfall.stokes.solve import fixed_spheres, response_rows, solve
+from dustfall.stokes.solve import response_rows, solve
 from dustfall.stokes.translation import translation_tables
 from dustfall.streams import Purpose, stream
 from dustfall.units import CONTACT, FORCE_UNIT, RADIUS, STOKES_DRAG

@@ -3,8 +3,9 @@
 import numpy as np
 
 from dustfall.columns import Column, write_columns
+from dustfall.stokes.methods import fixed_spheres
 from dustfall.stokes.plan import plan_scene
-from dustfall.stokes.solve import fixed_spheres, solve
+from dustfall.stokes.solve import solve
 
 COLUMNS = {
     "scene": Column("1", "number of the scene within its radial law"),

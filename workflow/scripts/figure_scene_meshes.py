@@ -39,7 +39,9 @@ panels = [
     pair.assign(scene=1, title=gap),
     pair[pair["sphere"] == 0].assign(scene=2, title="seen from the neighbour"),
 ]
-eyes = [(0.0, 0.0, 0.0), (0.0, 0.0, 0.0), neighbours[nearest, 0]]
+# The gap is seen from its side, across the flow, and then face to face.
+axis = neighbours[nearest, 0]
+eyes = [(0.0, 0.0, 0.0), np.cross(axis, (0.0, 1.0, 0.0)), axis]
 panels = [
     panel.assign(view_x=eye[0], view_y=eye[1], view_z=eye[2])
     for panel, eye in zip(panels, eyes, strict=True)

@@ -32,8 +32,8 @@ an element is cheaper."""
 class Side(NamedTuple):
     """One sphere of a pair with the quadrature that a tolerance asks for.
 
-    corners: (e, 3, 3). nodes: (e, 6). count: number of nodes. centre: (e, 3); reach: (e,) from it
-    to the farthest corner. far: distance, in reaches, from which each rule is enough. fewest: (e,),
+    corners: (e, 3, 3). nodes: (e, 6). unknowns: number of nodes. centre: (e, 3); reach: (e,), from
+    it to the farthest corner. far: distance, in reaches, from which each rule is enough. fewest: (e,),
     number of the smallest rule that integrates the shape functions of the element. rules,
     weights: the rules. points: by rule, (e, 3, q); shapes: by rule, (e, 6, q), shape functions
     times weights. outer: number of the largest rule for the outer integral.
@@ -41,7 +41,7 @@ class Side(NamedTuple):
 
     corners: np.ndarray
     nodes: np.ndarray
-    count: int
+    unknowns: int
     centre: np.ndarray
     reach: np.ndarray
     far: np.ndarray
@@ -70,7 +70,7 @@ def side(mesh: SphereMesh, tolerance: float) -> Side:
     return Side(
         corners=corners,
         nodes=mesh.quadratic_nodes,
-        count=int(mesh.quadratic_nodes.max()) + 1,
+        unknowns=int(mesh.quadratic_nodes.max()) + 1,
         centre=np.array([c for c, _ in size]),
         reach=np.array([r for _, r in size]),
         far=np.sinh(np.log(1.0 / tolerance) / (2.0 * counts)),
@@ -206,7 +206,7 @@ def _place_part(corners, part, share, rule, weights, points, shapes):
 @njit(cache=True)
 def _couple(target, source, shift, skip):
     """Six entries of G for each pair of nodes, (n, m, 6); shift: centre target - centre source."""
-    entries = np.zeros((target.count, source.count, 6))
+    entries = np.zeros((target.unknowns, source.unknowns, 6))
     last = len(source.far) - 1
     most = len(source.weights[last])
     g, points, shapes = np.empty((6, most)), np.empty((3, most)), np.empty((SHAPES, most))
@@ -258,9 +258,7 @@ def _couple(target, source, shift, skip):
                             _add_element(x, y, z, points, shapes, len(weights), g, inner)
                             continue
                         if depth == MOST_HALVINGS:
-                            raise ValueError(
-                                "gap too narrow: an element was quartered too often"
-                            )
+                            raise ValueError("gap too narrow: an element was quartered too often")
                         for k in range(4):
                             quarter(part, k, stack[top])
                             level[top] = depth + 1

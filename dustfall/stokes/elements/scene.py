@@ -303,7 +303,8 @@ def _solve_on(centres, flow, level: Level, strain: float) -> _OnLevel:
 
     undisturbed = np.tile(flow, (len(owner), 1))
     right = answer(undisturbed)
-    forces, residuals = right, []
+    forces = right
+    residuals: list[float] = []
     # Spheres of a cluster that are not near to each other meet here too.
     if exchanged.any():
         operator = LinearOperator((len(right), len(right)), matvec=system, dtype=float)
