@@ -264,10 +264,7 @@ void Foam::NeighbourDragForce<CloudType>::evaluate()
         }
         if (rows.size() == block || (n + 1 == order.size() && !rows.empty()))
         {
-            model_->drag
-            (
-                rows.size(), flow.data(), neighbours.data(), &rest[0], beta.data(), side.data()
-            );
+            predict(rows.size(), flow.data(), neighbours, rest, beta.data(), side.data());
             for (std::size_t k = 0; k < rows.size(); ++k)
             {
                 drag_[rows[k] - first_] =
@@ -282,49 +279,83 @@ void Foam::NeighbourDragForce<CloudType>::evaluate()
 
 
 template<class CloudType>
-typename Foam::NeighbourDragForce<CloudType>::drag
-Foam::NeighbourDragForce<CloudType>::otherDrag
+const typename Foam::NeighbourDragForce<CloudType>::drag&
+Foam::NeighbourDragForce<CloudType>::dragOn
 (
     const typename CloudType::parcelType& p,
     const vector& flow
 ) const
 {
-    const int wanted = model_->neighbours();
-    const auto known = place_.find(key(p));
-    const vector x = p.position();
+    const auto listed = place_.find(key(p));
+    const bool known = listed != place_.end();
+    const label row = known ? listed->second : -1;
+    if (first_ <= row && row < first_ + label(drag_.size()))
+    {
+        return drag_[row - first_];
+    }
+    const auto inserted = others_.emplace(key(p), drag{1, Zero});
+    drag& result = inserted.first->second;
+    if (!inserted.second)
+    {
+        return result;
+    }
 
+    // From another processor, or new
+    const int wanted = model_->neighbours();
+    const vector x = p.position();
     std::vector<dustfall::NearestNeighbours::Neighbour> found(wanted);
     const int number =
-        known != place_.end()
-      ? search_->find(known->second, wanted, found.data())
+        known
+      ? search_->find(row, wanted, found.data())
       : search_->find_near(&x[0], wanted, found.data());
-    if (number < wanted)
+    if (number == wanted)
     {
-        return drag{1, Zero};
+        std::vector<double> neighbours(3*wanted);
+        for (int j = 0; j < wanted; ++j)
+        {
+            double* separation = &neighbours[3*j];
+            if (known)
+            {
+                search_->separation(row, found[j].point, separation);
+            }
+            else
+            {
+                search_->separation_from(&x[0], found[j].point, separation);
+            }
+            for (direction axis = 0; axis < vector::nComponents; ++axis)
+            {
+                separation[axis] /= p.d();
+            }
+        }
+        const vector& seen = known ? flow_[row] : flow;
+        const vector rest = upwards();
+        predict(1, &seen[0], neighbours, rest, &result.beta, &result.side[0]);
     }
-
-    std::vector<double> neighbours(3*wanted);
-    for (int j = 0; j < wanted; ++j)
-    {
-        double* separation = &neighbours[3*j];
-        if (known != place_.end())
-        {
-            search_->separation(known->second, found[j].point, separation);
-        }
-        else
-        {
-            search_->separation_from(&x[0], found[j].point, separation);
-        }
-        for (direction axis = 0; axis < vector::nComponents; ++axis)
-        {
-            separation[axis] /= p.d();
-        }
-    }
-    drag result;
-    const vector& seen = known != place_.end() ? flow_[known->second] : flow;
-    const vector rest = upwards();
-    model_->drag(1, &seen[0], neighbours.data(), &rest[0], &result.beta, &result.side[0]);
     return result;
+}
+
+
+template<class CloudType>
+void Foam::NeighbourDragForce<CloudType>::predict
+(
+    const label number,
+    const scalar* flow,
+    const std::vector<double>& neighbours,
+    const vector& rest,
+    scalar* beta,
+    scalar* side
+) const
+{
+    try
+    {
+        model_->drag(number, flow, neighbours.data(), &rest[0], beta, side);
+    }
+    catch (const std::exception& error)
+    {
+        FatalErrorInFunction
+            << "A parcel of the cloud " << this->owner().name() << " has no drag: "
+            << error.what() << exit(FatalError);
+    }
 }
 
 
@@ -421,20 +452,12 @@ void Foam::NeighbourDragForce<CloudType>::cacheFields(const bool store)
     const scalar gathered = timer.timeIncrement();
 
     drag_.assign(this->owner().size(), drag{1, Zero});
+    others_.clear();
     const label count = search_->count();
     const label fewest = model_->neighbours() + 1;
     if (count >= fewest)
     {
-        try
-        {
-            evaluate();
-        }
-        catch (const std::exception& error)
-        {
-            FatalErrorInFunction
-                << "A parcel of the cloud " << this->owner().name() << " has no drag: "
-                << error.what() << exit(FatalError);
-        }
+        evaluate();
     }
     else if (count > 0 && !fewAreIsolated_)
     {
@@ -462,11 +485,7 @@ Foam::forceSuSp Foam::NeighbourDragForce<CloudType>::calcCoupled
     const scalar muc
 ) const
 {
-    const auto known = place_.find(key(p));
-    const label own = known == place_.end() ? -1 : known->second - first_;
-    const drag felt =
-        0 <= own && own < label(drag_.size()) ? drag_[own] : otherDrag(p, td.Uc() - p.U());
-
+    const drag& felt = dragOn(p, td.Uc() - p.U());
     const scalar stokes = 3*constant::mathematical::pi*muc*p.d();
     return forceSuSp(stokes*felt.side, stokes*felt.beta);
 }

@@ -4,8 +4,7 @@
 
 Everything that does not depend on the options is in `settling/`; this writes the rest: `settings`,
 the force model, and the parcels at the start, where a run of dustfall with the same seed has them.
-Then, in CASE: `blockMesh`, and `icoUncoupledKinematicParcelFoam`; or `blockMesh`, `decomposePar`,
-and `mpirun -n 2 icoUncoupledKinematicParcelFoam -parallel`.
+Then `CASE/Allrun` settles them on one rank, `CASE/Allrun 2` on two.
 """
 
 import argparse
