@@ -3,7 +3,7 @@
 #include "IFstream.H"
 #include "OSspecific.H"
 #include "coupledPolyPatch.H"
-#include "clockTime.H"
+#include "cpuTime.H"
 #include "interpolation.H"
 #include "mathematicalConstants.H"
 
@@ -446,10 +446,10 @@ void Foam::NeighbourDragForce<CloudType>::cacheFields(const bool store)
     {
         return;
     }
-    clockTime timer;
+    cpuTime timer;
     checkParcels();
     gather();
-    const scalar gathered = timer.timeIncrement();
+    const scalar gathered = timer.cpuTimeIncrement();
 
     drag_.assign(this->owner().size(), drag{1, Zero});
     others_.clear();
@@ -469,7 +469,7 @@ void Foam::NeighbourDragForce<CloudType>::cacheFields(const bool store)
     if (debug)
     {
         Info<< typeName << ": " << count << " parcels, gathered and sorted in " << gathered
-            << " s, neighbours and drag in " << timer.timeIncrement() << " s" << endl;
+            << " s, neighbours and drag in " << timer.cpuTimeIncrement() << " s" << endl;
     }
 }
 
