@@ -5,7 +5,8 @@ import shutil
 import numpy as np
 import pytest
 
-from dustfall.forces import FORMULAS
+from dustfall.forces import FORMULAS, load_model
+from dustfall.sedimentation import NearestNeighbours, random_start, step
 from tests.cpp.conftest import random_model
 from tests.openfoam.conftest import (
     PROPERTIES,
@@ -160,3 +161,17 @@ def test_parcels_injected_into_nothing_feel_stokes_drag_for_a_step(make_case):
     np.testing.assert_allclose(
         velocities[2], next_velocity(velocities[1], seen), rtol=0, atol=ROUNDING
     )
+
+
+def test_the_mean_velocity_is_that_of_the_packages_own_run(make_case):
+    """The solver moves parcels by explicit Euler steps: trajectories differ, averages agree."""
+    start = random_start(1000, 1e-3, seed=3, velocity="stokes")
+    case = make_case(start, steps=40)
+    case.run()
+    _, velocities, _ = case.frames()
+    state, closure = start, NearestNeighbours(load_model())
+    for _ in range(40):
+        state = step(state, closure, STEP, PROPERTIES.stokes_number)
+    enhanced = -state.velocity[:, 2].mean()
+    assert enhanced > 1.3
+    np.testing.assert_allclose(-velocities[-1][:, 2].mean(), enhanced, rtol=0.01)
