@@ -46,6 +46,54 @@ public:
     }
 };
 
+//- Where the two lines of OpenFOAM differ: that of www.openfoam.com defines OPENFOAM, that of
+//- openfoam.org does not
+#ifdef OPENFOAM
+template<class ParcelType>
+vector position(const ParcelType& p, const polyMesh&)
+{
+    return p.position();
+}
+
+template<class ParcelType>
+tetIndices tetOf(const ParcelType& p, const polyMesh&)
+{
+    return p.currentTetIndices();
+}
+
+inline bool turns(const coupledPolyPatch& patch)
+{
+    return !patch.parallel();
+}
+
+inline vector translation(const coupledPolyPatch& patch)
+{
+    return patch.separated() ? patch.separation()[0] : vector(Zero);
+}
+#else
+template<class ParcelType>
+vector position(const ParcelType& p, const polyMesh& mesh)
+{
+    return p.position(mesh);
+}
+
+template<class ParcelType>
+tetIndices tetOf(const ParcelType& p, const polyMesh& mesh)
+{
+    return p.currentTetIndices(mesh);
+}
+
+inline bool turns(const coupledPolyPatch& patch)
+{
+    return patch.transform().transforms();
+}
+
+inline vector translation(const coupledPolyPatch& patch)
+{
+    return patch.transform().t();
+}
+#endif
+
 } // End namespace Foam
 
 
@@ -70,20 +118,18 @@ Foam::vector Foam::NeighbourDragForce<CloudType>::meshPeriod() const
     bool rotated = false;
     bool oblique = false;
 
-    for (const polyPatch& patch : this->mesh().boundaryMesh())
+    forAll(this->mesh().boundaryMesh(), patchi)
     {
+        const polyPatch& patch = this->mesh().boundaryMesh()[patchi];
+
         // A patch may have all its faces on other processors.
         if (!isA<coupledPolyPatch>(patch) || patch.empty())
         {
             continue;
         }
         const coupledPolyPatch& coupled = refCast<const coupledPolyPatch>(patch);
-        rotated = rotated || !coupled.parallel();
-        if (!coupled.parallel() || !coupled.separated())
-        {
-            continue;
-        }
-        const vector separation = cmptMag(coupled.separation()[0]);
+        rotated = rotated || turns(coupled);
+        const vector separation = cmptMag(translation(coupled));
         label axes = 0;
         for (direction axis = 0; axis < vector::nComponents; ++axis)
         {
@@ -94,7 +140,7 @@ Foam::vector Foam::NeighbourDragForce<CloudType>::meshPeriod() const
                 least[axis] = min(least[axis], separation[axis]);
             }
         }
-        oblique = oblique || axes != 1;
+        oblique = oblique || axes > 1;
     }
     reduce(largest, maxOp<vector>());
     reduce(least, minOp<vector>());
@@ -172,8 +218,9 @@ void Foam::NeighbourDragForce<CloudType>::gather()
     label n = 0;
     for (const typename CloudType::parcelType& p : owner)
     {
-        const vector x = p.position();
-        const vector flow = Uc->interpolate(p.coordinates(), p.currentTetIndices()) - p.U();
+        const vector x = position(p, this->mesh());
+        const vector flow =
+            Uc->interpolate(p.coordinates(), tetOf(p, this->mesh())) - p.U();
         for (direction axis = 0; axis < vector::nComponents; ++axis)
         {
             own[n + axis] = x[axis];
@@ -259,7 +306,7 @@ void Foam::NeighbourDragForce<CloudType>::evaluate()
                     neighbours.push_back(component/diameter_);
                 }
             }
-            flow.insert(flow.end(), flow_[i].begin(), flow_[i].end());
+            flow.insert(flow.end(), &flow_[i][0], &flow_[i][0] + vector::nComponents);
             rows.push_back(i);
         }
         if (rows.size() == block || (n + 1 == order.size() && !rows.empty()))
@@ -302,7 +349,7 @@ Foam::NeighbourDragForce<CloudType>::dragOn
 
     // From another processor, or new
     const int wanted = model_->neighbours();
-    const vector x = p.position();
+    const vector x = position(p, this->mesh());
     std::vector<dustfall::NearestNeighbours::Neighbour> found(wanted);
     const int number =
         known
@@ -420,8 +467,8 @@ Foam::NeighbourDragForce<CloudType>::NeighbourDragForce
     Info<< "    " << typeName << ": model " << model_->name().c_str() << " with "
         << model_->neighbours() << " neighbours, SHA-256 " << model_->hash().c_str() << nl
         << "        from " << path << nl
-        << "        for the cloud " << owner.name() << " of parcels "
-        << CloudType::parcelType::typeName << ", periods " << period_ << " m" << endl;
+        << "        for " << owner.name() << ", a " << static_cast<const cloud&>(owner).type()
+        << ", periods " << period_ << " m" << endl;
 }
 
 

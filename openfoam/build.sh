@@ -7,7 +7,11 @@ set -euo pipefail
 cd "$(dirname "$0")"
 
 if [ -n "${WM_PROJECT_DIR:-}" ] && command -v wmake >/dev/null; then
-	exec wmake libso .
+	# Only the line of www.openfoam.com numbers its interface.
+	if [ -n "${FOAM_API:-}" ]; then
+		exec wmake libso .
+	fi
+	exec wmake libso foundation
 fi
 
 ARCH=${ARCH:--march=native}

@@ -17,7 +17,7 @@ def case(make_case):
 def test_an_untouched_case_is_not_refused_and_says_what_it_loaded(case):
     output = " ".join(case.run().split())
     assert "neighbourDrag: model anchored with 5 neighbours, SHA-256 " in output
-    assert "for the cloud kinematicCloud of parcels basicKinematicCollidingParcel" in output
+    assert "for kinematicCloud, a Cloud<basicKinematicCollidingParcel>" in output
 
 
 def test_a_missing_model_is_named(case):
