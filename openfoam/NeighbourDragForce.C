@@ -241,27 +241,24 @@ void Foam::NeighbourDragForce<CloudType>::gather()
         }
         count += parcels[proci].size()/numbers;
     }
-    std::vector<double> position;
-    std::vector<int64_t> keys;
-    position.reserve(3*count);
-    keys.reserve(count);
-    flow_.clear();
-    flow_.reserve(count);
-    place_.clear();
-    place_.reserve(count);
+    std::vector<double> places(3*count);
+    std::vector<int64_t> keys(count);
+    flow_.resize(count);
+    rows_.reset(count);
+    label row = 0;
     for (const scalarField& values : parcels)
     {
-        for (label i = 0; i < values.size(); i += numbers)
+        for (label i = 0; i < values.size(); i += numbers, ++row)
         {
-            position.insert(position.end(), &values[i], &values[i] + 3);
-            flow_.push_back(vector(values[i + 3], values[i + 4], values[i + 5]));
-            keys.push_back(int64_t(values[i + 6]));
-            place_[keys.back()] = label(keys.size()) - 1;
+            std::copy(&values[i], &values[i] + 3, &places[3*row]);
+            flow_[row] = vector(values[i + 3], values[i + 4], values[i + 5]);
+            keys[row] = int64_t(values[i + 6]);
+            rows_.insert(keys[row], row);
         }
     }
     search_.reset
     (
-        new dustfall::NearestNeighbours(count, position.data(), keys.data(), &period_[0])
+        new dustfall::NearestNeighbours(count, places.data(), keys.data(), &period_[0])
     );
 }
 
@@ -333,9 +330,8 @@ Foam::NeighbourDragForce<CloudType>::dragOn
     const vector& flow
 ) const
 {
-    const auto listed = place_.find(key(p));
-    const bool known = listed != place_.end();
-    const label row = known ? listed->second : -1;
+    const label row = rows_.find(key(p));
+    const bool known = row >= 0;
     if (first_ <= row && row < first_ + label(drag_.size()))
     {
         return drag_[row - first_];

@@ -7,10 +7,10 @@ set -euo pipefail
 cd "$(dirname "$0")"
 
 if [ -n "${WM_PROJECT_DIR:-}" ] && command -v wmake >/dev/null; then
-	# Only the line of www.openfoam.com numbers its interface.
-	if [ -n "${FOAM_API:-}" ]; then
-		exec wmake libso .
-	fi
+	# Versions of www.openfoam.com are v1912 or v2506, those of openfoam.org 11 or 13.
+	case "$WM_PROJECT_VERSION" in
+	v*) exec wmake libso . ;;
+	esac
 	exec wmake libso foundation
 fi
 

@@ -1,6 +1,6 @@
 """Make an OpenFOAM case: spheres of the paper's table settle in a periodic cube of fluid at rest.
 
-    python openfoam/cases/make_settling.py CASE [--particles 1000] [--phi 1e-3] ...
+    python -m openfoam.cases.make_settling CASE [--particles 1000] [--phi 1e-3] ...
 
 Everything that does not depend on the options is in `settling/`; this writes the rest: `settings`,
 the force model, and the parcels at the start, where a run of dustfall with the same seed has them.

@@ -1,6 +1,5 @@
 """Cases of the plugin: made, changed, run on one rank or two, and read back."""
 
-import importlib.util
 import re
 import shutil
 import subprocess
@@ -13,9 +12,8 @@ import pytest
 from dustfall.forces import load_model
 from dustfall.sedimentation import Properties, start_from
 from dustfall.sedimentation.closures.nearest_neighbours import drag_coefficients
+from openfoam.cases.make_settling import PLUGIN, make_case
 
-OPENFOAM = Path(__file__).parents[2] / "openfoam"
-PLUGIN = OPENFOAM / "build" / "libneighbourDrag.so"
 SOLVER = "icoUncoupledKinematicParcelFoam"
 
 PROPERTIES = Properties()
@@ -31,21 +29,12 @@ def pytest_collection_modifyitems(items):
                 item.add_marker(pytest.mark.skip("no plugin here: openfoam/build.sh makes it"))
 
 
-def _maker():
-    specification = importlib.util.spec_from_file_location(
-        "make_settling", OPENFOAM / "cases" / "make_settling.py"
-    )
-    module = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(module)
-    return module.make_case
-
-
 class Case:
     """A case in a folder, with parcels in the order of the numbers that they had at the start."""
 
     def __init__(self, folder, start, steps=3, model=None, **settings):
         self.folder, self.start = folder, start
-        _maker()(folder, start, STEP, steps * STEP, model=model, properties=PROPERTIES, **settings)
+        make_case(folder, start, STEP, steps * STEP, model=model, properties=PROPERTIES, **settings)
 
     def change(self, file, *replacements):
         """Replace text in a file of the case; each (old, new) has to occur."""
@@ -129,8 +118,8 @@ def _numbers(path, columns):
     return np.array(values, dtype=float).reshape(-1, columns)
 
 
-@pytest.fixture
-def make_case(tmp_path):
+@pytest.fixture(name="make_case")
+def _make_case(tmp_path):
     """A function that makes a case in a folder of this test."""
 
     def make(start, name="case", **settings):
