@@ -253,7 +253,12 @@ void Foam::NeighbourDragForce<CloudType>::gather()
             std::copy(&values[i], &values[i] + 3, &places[3*row]);
             flow_[row] = vector(values[i + 3], values[i + 4], values[i + 5]);
             keys[row] = int64_t(values[i + 6]);
-            rows_.insert(keys[row], row);
+            if (!rows_.insert(keys[row], row))
+            {
+                FatalErrorInFunction
+                    << "Two parcels have the same origProc and origId, by which the drag on a"
+                    << " parcel is found again on any processor" << exit(FatalError);
+            }
         }
     }
     search_.reset

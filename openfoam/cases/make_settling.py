@@ -47,7 +47,6 @@ def make_case(
     save_every: int = 1,
     model=None,
     processors: int = 2,
-    plugin: Path = PLUGIN,
     properties: Properties | None = None,
 ) -> None:
     """Write a case into the folder `case`.
@@ -59,7 +58,6 @@ def make_case(
     step, duration : in tau; save_every : steps between frames
     model : force model; by default the one that ships
     processors : that the case can be decomposed for
-    plugin : library of the drag
     properties : of fluid and spheres; by default those of the paper
 
     Raises
@@ -85,7 +83,8 @@ def make_case(
         "duration": duration * properties.response_time,
         "saveEvery": save_every,
         "processors": processors,
-        "plugin": f'"{Path(plugin).resolve()}"',
+        # wmake puts it where OpenFOAM looks by itself.
+        "plugin": f'"{PLUGIN.resolve() if PLUGIN.exists() else PLUGIN.name}"',
     }
     (case / "settings").write_text("".join(f"{key} {value};\n" for key, value in settings.items()))
     _write_parcels(case, start, cells, properties)

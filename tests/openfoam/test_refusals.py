@@ -67,6 +67,11 @@ def test_coincident_parcels_are_refused(make_case):
     assert "at the centre of the reference sphere" in make_case(start, steps=1).refusal()
 
 
+def test_parcels_that_cannot_be_told_apart_are_refused(case):
+    case.change(f"{PARCELS}/origId", ("\n7\n", "\n6\n"))
+    assert "Two parcels have the same origProc and origId" in case.refusal()
+
+
 def test_fewer_parcels_than_the_model_needs_are_refused_or_isolated(make_case):
     start = random_cloud(particles=5, phi=1e-3)
     case = make_case(start, steps=1)
