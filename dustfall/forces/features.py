@@ -129,7 +129,7 @@ class Scenes:
 BASELINES = {formula.name: formula for formula in (ISOLATED, ROTNE_PRAGER, REFLECTIONS)}
 """Formulas that networks may stand on."""
 
-_FADING = {"isolated": 1, "rotne_prager": 1, "reflections": 4}
+FADING = {"isolated": 1, "rotne_prager": 1, "reflections": 4}
 """Power of 1/distance by which what the networks add to a baseline falls, as its error does."""
 
 
@@ -151,7 +151,7 @@ def describe(kind: str, neighbours: np.ndarray, radial_input: str, largest: floa
     first = block_inputs(layout.blocks, neighbours.shape[1])[:, 1]
     if layout.unit_vectors:
         inputs = _unit_vectors(seen, largest)
-        power = _FADING[layout.baseline]
+        power = FADING[layout.baseline]
         envelope = inputs[:, first, 0] ** power
     else:
         inputs = spherical_coordinates(seen)

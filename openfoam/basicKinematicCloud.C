@@ -1,0 +1,5 @@
+#include "basicKinematicCloud.H"
+#include "NeighbourDragForce.H"
+
+// One file a cloud: the macro defines a type of a fixed name.
+makeParticleForceModelType(NeighbourDragForce, basicKinematicCloud);
