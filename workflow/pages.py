@@ -40,7 +40,7 @@ class Written(string.Formatter):
             case "power":
                 return np.format_float_scientific(value, trim="-", exp_digits=1)
             case "error" if value == 0 or PLAIN[0] <= abs(value) < PLAIN[1]:
-                return f"{value:.2g}"
+                return f"{value:#.2g}".rstrip(".") if value else "0"
             case "error":
                 return np.format_float_scientific(value, 1, unique=False, exp_digits=1)
             case "near_one":
@@ -87,6 +87,17 @@ def _cell(row: Mapping, pattern: Pattern) -> str:
     return ""
 
 
+def wide(table: pd.DataFrame, rows: str, by: str) -> pd.DataFrame:
+    """One row for each value of the column `rows`; the others stand side by side for each of `by`.
+
+    value of the row with by = x becomes the column value_x. Rows keep their order. Raises
+    ValueError where two rows share both values.
+    """
+    pivoted = table.pivot(index=rows, columns=by)
+    pivoted.columns = pd.Index([f"{name}_{value}" for name, value in pivoted.columns])
+    return pivoted.loc[table[rows].unique()].reset_index()
+
+
 def read_tables(folder: Path) -> dict[str, pd.DataFrame]:
     """Every table of a folder of CSV files by its name."""
     return {path.stem: pd.read_csv(path) for path in sorted(folder.glob("*.csv"))}
@@ -107,9 +118,12 @@ def render(template: Path, tables: Mapping[str, pd.DataFrame], **values: Any) ->
     )
     environment.filters["written"] = written
 
-    def table(name: str, columns: Mapping[str, Pattern]) -> str:
-        """A table of the page, or the word for one that is not there."""
-        return markdown_table(tables[name], columns) if name in tables else MISSING
+    def table(name: str, columns: Mapping[str, Pattern], side_by_side: Sequence[str] = ()) -> str:
+        """A table of the page, as it is or made `wide`, or the word for one that is not there."""
+        if name not in tables:
+            return MISSING
+        rows = wide(tables[name], *side_by_side) if side_by_side else tables[name]
+        return markdown_table(rows, columns)
 
     text = environment.get_template(template.name).render(
         tables=tables, table=table, missing=MISSING, **values

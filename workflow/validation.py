@@ -25,6 +25,7 @@ from dustfall.analysis.references import (
     PAPER_SCORES,
     PAPER_SETTLING,
 )
+from dustfall.benchmarks.solver import MULTIPOLE
 from dustfall.forces.registry import title
 from dustfall.scenes import LAWS
 from dustfall.sedimentation.properties import Properties
@@ -65,9 +66,6 @@ PAIR_DISTANCES = (2.01, 2.1, 2.5, 3.0, 5.0, 10.0, 20.0)
 PAIR_EXPONENTS = (4, 6, 8)
 """Decades of the tolerances at which two spheres are solved."""
 
-SOLVER = "boundary elements and harmonics"
-"""What `benchmarks.solver` calls this solver."""
-
 COMPARED_SETS = 2
 """Sets of scenes in which methods are compared: the last ones, the densest decade and contact."""
 
@@ -95,11 +93,10 @@ class Provenance(NamedTuple):
     cores: int
     versions: dict[str, str]
     configuration: str
-    seed: int
 
 
-def provenance(configuration: str, seed: int) -> Provenance:
-    """Provenance of what is measured here and now, under a configuration file and a seed."""
+def provenance(configuration: str) -> Provenance:
+    """Provenance of what is measured here and now, under the named configuration files."""
     return Provenance(
         _commit(),
         datetime.date.today().isoformat(),
@@ -107,7 +104,6 @@ def provenance(configuration: str, seed: int) -> Provenance:
         os.cpu_count() or 1,
         {name: version(name) for name in ("numpy", "scipy", "numba", "torch")},
         configuration,
-        seed,
     )
 
 
@@ -154,7 +150,7 @@ def pairs() -> pd.DataFrame:
 
 def random_scenes(solver: pd.DataFrame) -> pd.DataFrame:
     """This solver's error and coverage over all random scenes, one row a tolerance."""
-    own = solver[solver["method"] == SOLVER]
+    own = solver[solver["method"] == MULTIPOLE]
     return own.groupby("setting", sort=False, as_index=False).agg(
         scenes=("scenes", "sum"),
         fastest=("milliseconds", "min"),
@@ -254,26 +250,26 @@ def scenes(summary: pd.DataFrame) -> pd.DataFrame:
     return _in_order(table, "radial_law", LAWS)
 
 
-def scores(evaluation: pd.DataFrame) -> pd.DataFrame:
-    """Scores on all test scenes of a law: one row a law and model, the better ones below."""
+def scores(evaluation: pd.DataFrame, violations: pd.DataFrame) -> pd.DataFrame:
+    """Scores on all test scenes of a law: one row a law and model, the better ones below.
+
+    asymmetry is the largest RMS violation of a symmetry, over the scenes of all laws.
+    """
     table = _by_component(evaluation, ["radial_law", "model"], ["r2", "rms_error", "largest_error"])
     columns = {f"r2_{component}": f"paper_{component}" for component in COMPONENTS}
     paper = PAPER_SCORES.rename(columns=columns).assign(radial_law=PAPER_LAW)
     table = table.merge(paper, on=["radial_law", "model"], how="left")
-    table = table.assign(title=table["model"].map(title))
-    return _in_order(table.sort_values("r2_streamwise"), "radial_law", LAWS)
-
-
-def symmetries(violations: pd.DataFrame) -> pd.DataFrame:
-    """RMS violation of each symmetry: one row a model."""
-    wide = violations.pivot(index="model", columns="symmetry", values="rms").reset_index()
-    return wide.assign(title=wide["model"].map(title))
+    asymmetry = violations.groupby("model")["rms"].max()
+    table = table.assign(
+        title=table["model"].map(title), asymmetry=table["model"].map(asymmetry)
+    ).sort_values("r2_streamwise")
+    return _in_order(table, "radial_law", LAWS).drop(columns="model")
 
 
 def learning_curve(trials: pd.DataFrame) -> pd.DataFrame:
     """Scores on the paper's law against the number of scenes: one row a model and number."""
     own = trials[trials["radial_law"] == PAPER_LAW]
-    return _by_component(own, ["title", "training_scenes"], ["r2"])
+    return _by_component(own, ["model", "training_scenes"], ["r2"])
 
 
 def ablation(trials: pd.DataFrame) -> pd.DataFrame:
@@ -489,8 +485,7 @@ TABLES: dict[str, tuple[Callable[..., pd.DataFrame], tuple[str, ...]]] = {
     "strain": (strain, (STRESS,)),
     "scenes": (scenes, ("results/dataset/summary.csv",)),
     "forces": (forces, ("results/dataset/summary.json",)),
-    "scores": (scores, ("results/model/evaluation.csv",)),
-    "symmetries": (symmetries, ("results/model/symmetries.csv",)),
+    "scores": (scores, ("results/model/evaluation.csv", "results/model/symmetries.csv")),
     "learning_curve": (learning_curve, ("results/model/learning_curve.csv",)),
     "ablation": (ablation, ("results/model/ablation.csv",)),
     "sweep": (sweep, ("results/sweep/summary.csv",)),

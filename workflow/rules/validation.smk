@@ -24,6 +24,5 @@ rule validation:
     params:
         docs="docs",
         configuration=", ".join(os.path.relpath(file) for file in workflow.configfiles),
-        seed=config["seed"],
     script:
         "../scripts/validation.py"

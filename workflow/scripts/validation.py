@@ -11,7 +11,7 @@ joblog.start(snakemake.log[0])
 params = snakemake.params
 campaign, docs = Path(), Path(params.docs)
 tables = docs / "validation"
-collect(campaign, tables, provenance(params.configuration, params.seed))
+collect(campaign, tables, provenance(params.configuration))
 copy_pictures(campaign, docs / "pictures")
 with atomic(docs / "validation.md") as path:
     text = page(Path(snakemake.input.template), tables)
