@@ -29,7 +29,7 @@ from dustfall.benchmarks.solver import MULTIPOLE
 from dustfall.forces.registry import title
 from dustfall.scenes import LAWS
 from dustfall.sedimentation.properties import Properties
-from dustfall.stokes import fixed_spheres
+from dustfall.stokes import Status, fixed_spheres
 from dustfall.stokes.references.exact_pairs import forces_on_two_spheres
 from dustfall.units import COMPONENTS, RADIUS, SPHERE_VOLUME, STOKES_DRAG
 from workflow.library import ROOT
@@ -133,7 +133,7 @@ def _processor() -> str:
 def pairs() -> pd.DataFrame:
     """Largest error of the force on two spheres, along and across their line, over 24.
 
-    Columns distance [radii] and error_4, error_6, error_8 at the tolerances 1e-4, 1e-6 and 1e-8.
+    Columns distance [radii], and along_k and across_k at the tolerance 1e-k of `PAIR_EXPONENTS`.
     """
     rows = []
     for distance in PAIR_DISTANCES:
@@ -177,33 +177,36 @@ def methods(solver: pd.DataFrame) -> pd.DataFrame:
     return found
 
 
-def clusters(stress: pd.DataFrame) -> pd.DataFrame:
-    """Nearly touching clusters: one row a cluster and tolerance, over all gaps."""
+def strain(stress: pd.DataFrame) -> pd.DataFrame:
+    """What strains the solver: one row a tolerance, over clusters and gaps, the finest last.
+
+    apart, moved, turned and alike are the largest errors of `benchmarks.stress.distances` and of
+    each change of `benchmarks.stress.invariances`.
+    """
+    names = {
+        "pair": "apart",
+        "moved [d_p]": "moved",
+        "turned": "turned",
+        "distances alike": "alike",
+    }
     rows = []
-    for (case, tolerance), group in stress[stress["test"] == "gap"].groupby(
-        ["case", "tolerance"], sort=False
-    ):
-        converged = group[group["status"] == "converged"]
+    for tolerance, group in stress.groupby("tolerance"):
+        gaps = group[group["test"] == "gap"]
+        converged = gaps[gaps["status"] == str(Status.CONVERGED)]
+        rest = group[group["test"].isin(["distance", "invariance"])]
         rows.append(
             {
-                "cluster": case,
                 "tolerance": tolerance,
-                "gaps": len(group),
+                "clusters": len(gaps),
                 "converged": len(converged),
                 "smallest_gap": converged["value"].min(),
                 "slowest": 1e3 * converged["seconds"].max(),
                 "error_max": converged["error"].max(),
-                "covered": (group["estimate"] >= group["error"]).mean(),
+                "covered": (gaps["estimate"] >= gaps["error"]).mean(),
             }
+            | rest.groupby("case")["error"].max().rename(names).to_dict()
         )
-    return pd.DataFrame(rows)
-
-
-def strain(stress: pd.DataFrame) -> pd.DataFrame:
-    """Largest error of what should change nothing, and of spheres far apart, by tolerance."""
-    rest = stress[stress["test"].isin(["distance", "invariance"])]
-    largest = rest.groupby(["test", "case", "tolerance"], sort=False)["error"].max()
-    return largest.reset_index()
+    return pd.DataFrame(rows).sort_values("tolerance", ascending=False, ignore_index=True)
 
 
 def meshes(study: pd.DataFrame, convergence: pd.DataFrame) -> pd.DataFrame:
@@ -481,7 +484,6 @@ TABLES: dict[str, tuple[Callable[..., pd.DataFrame], tuple[str, ...]]] = {
     "random_scenes": (random_scenes, (SOLVER_BENCHMARK,)),
     "methods": (methods, (SOLVER_BENCHMARK,)),
     "spheres": (pd.DataFrame, ("results/benchmarks/spheres.csv",)),
-    "clusters": (clusters, (STRESS,)),
     "strain": (strain, (STRESS,)),
     "scenes": (scenes, ("results/dataset/summary.csv",)),
     "forces": (forces, ("results/dataset/summary.json",)),

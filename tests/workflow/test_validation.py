@@ -41,6 +41,9 @@ STRESS = pd.DataFrame(
         ("gap", "pair", 1e-4, 1e-4, 0.120, 9e-4, 6e-6, "out of reach"),
         ("distance", "pair", 10.0, 1e-4, 0.001, 1e-5, 2e-5, "converged"),
         ("distance", "pair", 100.0, 1e-4, 0.001, 3e-9, 2e-5, "converged"),
+        ("invariance", "moved [d_p]", 1e3, 1e-4, None, 1e-8, None, None),
+        ("invariance", "turned", None, 1e-4, None, 2e-7, None, None),
+        ("invariance", "distances alike", 1e-12, 1e-4, None, 3e-7, None, None),
         ("condition, one body", "50 elements", 1.0, None, None, None, None, None),
     ],
     columns=["test", "case", "value", "tolerance", "seconds", "error", "estimate", "status"],
@@ -48,7 +51,7 @@ STRESS = pd.DataFrame(
 
 
 @pytest.fixture
-def campaign(tmp_path) -> Path:
+def benchmarked(tmp_path) -> Path:
     """A folder as a campaign leaves it that ran the benchmark of the solver alone."""
     for file, table in {"solver": SOLVER, "stress": STRESS}.items():
         path = tmp_path / f"results/benchmarks/{file}.csv"
@@ -142,25 +145,24 @@ def test_readme_leaves_measured_numbers_to_the_page():
     assert not re.search(r"\d", prose)
 
 
-def test_a_table_without_its_source_is_left_out_and_a_former_one_removed(campaign, tmp_path):
+def test_a_table_without_its_source_is_left_out_and_a_former_one_removed(benchmarked, tmp_path):
     target = tmp_path / "tables"
     target.mkdir()
     (target / "scores.csv").write_text("of another campaign\n")
-    validation.collect(campaign, target, FOUND)
+    validation.collect(benchmarked, target, FOUND)
     names = {path.stem for path in target.glob("*.csv")}
     assert names == {
         "pairs",
         "random_scenes",
         "methods",
-        "clusters",
         "strain",
         "run_times",
         "oseen",
     }
 
 
-def test_what_is_left_out_is_said_in_its_place(campaign, tmp_path):
-    validation.collect(campaign, tmp_path / "tables", FOUND)
+def test_what_is_left_out_is_said_in_its_place(benchmarked, tmp_path):
+    validation.collect(benchmarked, tmp_path / "tables", FOUND)
     text = validation.page(TEMPLATE, tmp_path / "tables")
     for part in ("## Data set", "**Sweep**", "**Step size.**", "**Cost of a prediction.**"):
         after = text.split(part)[1].split("\n\n**")[0].split("\n\n## ")[0]
@@ -168,9 +170,9 @@ def test_what_is_left_out_is_said_in_its_place(campaign, tmp_path):
         assert not re.search(r"^\|", after, re.M), part
 
 
-def test_collecting_twice_gives_the_same_bytes(campaign, tmp_path):
+def test_collecting_twice_gives_the_same_bytes(benchmarked, tmp_path):
     for folder in ("one", "two"):
-        validation.collect(campaign, tmp_path / folder, FOUND)
+        validation.collect(benchmarked, tmp_path / folder, FOUND)
     one, two = (
         {path.name: path.read_bytes() for path in (tmp_path / folder).iterdir()}
         for folder in ("one", "two")
@@ -182,11 +184,11 @@ def test_reduced_tables_keep_the_worst_of_what_they_reduce():
     row = validation.random_scenes(SOLVER).iloc[0]
     assert (row["error_max"], row["covered"], row["scenes"]) == (4e-3, 0.98, 150)
     assert (row["fastest"], row["slowest"]) == (0.4, 2.2)
-    clusters = validation.clusters(STRESS).iloc[0]
-    assert (clusters["gaps"], clusters["converged"], clusters["smallest_gap"]) == (2, 1, 0.1)
+    row = validation.strain(STRESS).iloc[0]
+    assert (row["clusters"], row["converged"], row["smallest_gap"]) == (2, 1, 0.1)
     # What is out of reach has no part in the error of the converged, but in what is covered.
-    assert (clusters["error_max"], clusters["covered"]) == (1e-6, 0.5)
-    assert validation.strain(STRESS)["error"].tolist() == [1e-5]
+    assert (row["error_max"], row["covered"]) == (1e-6, 0.5)
+    assert row[["apart", "moved", "turned", "alike"]].tolist() == [1e-5, 1e-8, 2e-7, 3e-7]
 
 
 def test_methods_stand_side_by_side_in_the_two_hardest_sets():
@@ -195,8 +197,8 @@ def test_methods_stand_side_by_side_in_the_two_hardest_sets():
     assert table["dense_milliseconds"].tolist() == [0.9, 0.3]
 
 
-def test_run_times_are_sums_over_the_jobs_of_a_stage(campaign):
-    table = validation.run_times(campaign / "benchmarks").set_index("stage")
+def test_run_times_are_sums_over_the_jobs_of_a_stage(benchmarked):
+    table = validation.run_times(benchmarked / "benchmarks").set_index("stage")
     assert table["core_seconds"].to_dict() == {"stokes": 5.5, "dataset": 0.5}
     assert table["jobs"].to_dict() == {"stokes": 2, "dataset": 1}
     assert table.loc["stokes", "memory"] == 350
