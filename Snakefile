@@ -1,7 +1,7 @@
 # The campaign: random scenes, their forces, force models, sedimentation, figures.
 # `snakemake -n` shows the plan, `snakemake all` runs it, `snakemake figures` makes the figures,
 # `snakemake exports` writes trajectories for ParaView, `snakemake benchmarks` times the solver,
-# `snakemake studies` compares time steps.
+# `snakemake studies` compares time steps, `snakemake validation` writes the numbers of the docs.
 import json
 import os
 import sys
@@ -59,6 +59,9 @@ rule all:
         "results/analysis/neighbour_changes.csv",
         "results/model/ablation.csv",
         FIGURES,
+
+
+include: "workflow/rules/validation.smk"
 
 
 rule figures:

@@ -17,7 +17,7 @@ class Project:
 
     def __init__(self, folder: Path):
         self.folder = folder
-        for name in ("config", "dustfall", "profiles", "workflow"):
+        for name in ("config", "docs", "dustfall", "profiles", "workflow"):
             shutil.copytree(ROOT / name, folder / name)
         shutil.copy2(ROOT / "Snakefile", folder)
         self.rules: set[str] = set()

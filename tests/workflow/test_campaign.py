@@ -4,6 +4,8 @@ import h5py
 import numpy as np
 import pytest
 
+from workflow import validation
+
 pytestmark = pytest.mark.slow
 
 SMOKE = ("--configfile", "config/smoke.yaml")
@@ -61,3 +63,13 @@ def test_a_formula_added_as_one_file_appears_in_tables_and_figures(campaign):
     assert f"\n{name}," in (results / "analysis/steady_state.csv").read_text()
     for figure in ("error_by_distance", "inverse_beta"):
         assert "screened" in (results / f"figures/{figure}.csv").read_text(), figure
+
+
+def test_the_page_of_the_docs_is_written_from_it(campaign):
+    campaign.run(*SMOKE, "--", "validation")
+    docs, figures = campaign.folder / "docs", campaign.folder / "results/figures"
+    page = (docs / "validation.md").read_text()
+    assert "config/smoke.yaml" in page
+    assert page == validation.page(docs / "validation.md.jinja", docs / "validation")
+    for figure in ("inverse_beta.png", "settling_cloud.gif"):
+        assert (docs / "pictures" / figure).read_bytes() == (figures / figure).read_bytes()

@@ -1,0 +1,261 @@
+"""The numbers of the docs come from the tables beside them, and these from a campaign."""
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import jinja2
+import pandas as pd
+import pytest
+import yaml
+
+from dustfall.benchmarks.solver import MULTIPOLE
+from workflow import validation
+from workflow.pages import Written, markdown_table, read_tables, render, wide
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+TEMPLATE = DOCS / "validation.md.jinja"
+TABLES = DOCS / "validation"
+PAGE = (DOCS / "validation.md").read_text(encoding="utf-8")
+
+SOLVER = pd.DataFrame(
+    [
+        ("phi from 1e-8", MULTIPOLE, "tolerance 1e-2", 50, 0.4, 1e-5, 1e-3, 1.0, 3.0),
+        ("phi from 1e-4", MULTIPOLE, "tolerance 1e-2", 50, 0.9, 3e-4, 2e-3, 0.98, 8.0),
+        ("near contact", MULTIPOLE, "tolerance 1e-2", 50, 2.2, 2e-4, 4e-3, 1.0, 19.0),
+        ("phi from 1e-8", "peer", None, 2, 0.3, 1e-3, 5e-2, None, None),
+        ("phi from 1e-4", "peer", None, 2, 0.3, 2e-3, 6e-2, None, None),
+        ("near contact", "peer", None, 2, 0.5, 3e-3, 7e-2, None, None),
+    ],
+    columns=[
+        "set", "method", "setting", "scenes", "milliseconds",
+        "error_median", "error_max", "covered", "estimate_over_error",
+    ],
+)  # fmt: skip
+
+STRESS = pd.DataFrame(
+    [
+        ("gap", "pair", 0.1, 1e-4, 0.002, 1e-6, 2e-5, "converged"),
+        ("gap", "pair", 1e-4, 1e-4, 0.120, 9e-4, 6e-6, "out of reach"),
+        ("distance", "pair", 10.0, 1e-4, 0.001, 1e-5, 2e-5, "converged"),
+        ("distance", "pair", 100.0, 1e-4, 0.001, 3e-9, 2e-5, "converged"),
+        ("invariance", "moved [d_p]", 1e3, 1e-4, None, 1e-8, None, None),
+        ("invariance", "turned", None, 1e-4, None, 2e-7, None, None),
+        ("invariance", "distances alike", 1e-12, 1e-4, None, 3e-7, None, None),
+        ("condition, one body", "50 elements", 1.0, None, None, None, None, None),
+    ],
+    columns=["test", "case", "value", "tolerance", "seconds", "error", "estimate", "status"],
+)
+
+
+@pytest.fixture
+def benchmarked(tmp_path) -> Path:
+    """A folder as a campaign leaves it that ran the benchmark of the solver alone."""
+    for file, table in {"solver": SOLVER, "stress": STRESS}.items():
+        path = tmp_path / f"results/benchmarks/{file}.csv"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        table.to_csv(path, index=False)
+    shutil.copyfile(TABLES / "config.yaml", tmp_path / validation.CONFIGURATION)
+    for path, seconds in {"stokes/ball-0000": 2.0, "stokes/ball-0001": 3.5, "dataset": 0.5}.items():
+        place = tmp_path / f"benchmarks/{path}.tsv"
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_text(f"s\tmax_rss\tcpu_time\n9.0\t{100 * seconds}\t{seconds}\n")
+    return tmp_path
+
+
+FOUND = validation.Provenance("abc", "2026-01-01", "a processor", 2, {"numpy": "2"}, "config")
+
+
+def test_the_page_is_what_its_tables_make():
+    assert validation.page(TEMPLATE, TABLES) == PAGE
+
+
+@pytest.mark.parametrize("table", sorted(path.name for path in TABLES.glob("*.csv")))
+def test_every_row_of_a_table_shows_in_the_page(table, tmp_path):
+    for path in TABLES.iterdir():
+        shutil.copyfile(path, tmp_path / path.name)
+    lines = (TABLES / table).read_text(encoding="utf-8").splitlines(keepends=True)
+    for left_out in range(2, len(lines)):
+        rest = lines[:left_out] + lines[left_out + 1 :]
+        (tmp_path / table).write_text("".join(rest), encoding="utf-8")
+        assert validation.page(TEMPLATE, tmp_path) != PAGE, lines[left_out]
+
+
+def test_the_page_tells_code_day_machine_and_configuration():
+    head = PAGE.split("## ")[0]
+    found = json.loads((TABLES / "provenance.json").read_text(encoding="utf-8"))
+    versions = [f"{name} {number}" for name, number in found.pop("versions").items()]
+    for value in [*found.values(), *versions]:
+        assert str(value) in head
+    config = yaml.safe_load((TABLES / "config.yaml").read_text(encoding="utf-8"))
+    assert f"seed {config['seed']}" in head
+
+
+def test_no_number_of_the_page_is_written_by_hand():
+    text = TEMPLATE.read_text(encoding="utf-8")
+    assert not re.search(r"^ *\|", text, re.M), "a table by hand"
+    prose = re.sub(r"{#.*?#}|{{.*?}}|{%.*?%}|`[^`]*`|\]\([^)]*\)", "", text, flags=re.S)
+    # Names of quantities, years of references and the level of all intervals are no results.
+    prose = re.sub(r"1/beta|1/r|R\^2|\((19|20)\d\d\)|95 %", "", prose)
+    assert not re.findall(r".*\d.*", prose)
+
+
+def test_every_picture_that_the_docs_show_is_there_and_comes_from_a_campaign():
+    shown = {
+        (page.parent / target).resolve()
+        for page in [ROOT / "README.md", *DOCS.glob("*.md")]
+        for target in re.findall(r"!\[[^]]*\]\(([^)]*)\)", page.read_text(encoding="utf-8"))
+    }
+    shown |= {
+        DOCS / "pictures" / f"{name}.png"
+        for name in re.findall(r'picture\("(\w+)"', TEMPLATE.read_text(encoding="utf-8"))
+    }
+    assert {path.name for path in shown} == set(validation.PICTURES)
+    assert [path for path in shown if not path.is_file()] == []
+
+
+def test_all_that_the_page_is_made_from_is_made_by_the_campaign_or_named_by_its_rule(project):
+    words = project.dry_run("--", "all")
+    made = {
+        file.strip() for line in re.findall("^    output: (.*)$", words, re.M)
+        for file in line.split(",")
+    }  # fmt: skip
+    rule = (ROOT / "workflow/rules/validation.smk").read_text(encoding="utf-8")
+    further = set(re.findall(r'"(results/[^"]*)"', rule))
+    needed = {path for _, sources in validation.TABLES.values() for path in sources}
+    assert {path for path in needed if path.startswith("results/")} - made == further
+    # A picture comes with the numbers that it draws.
+    beside = {str(Path(path).with_suffix(".csv")) for path in validation.PICTURES.values()}
+    assert {Path(path).stem for path in beside - made} <= {Path(path).stem for path in [
+        *further, "settling_cloud.gif"]}  # fmt: skip
+
+
+def test_the_page_is_no_part_of_all_and_needs_all_of_it(project):
+    whole = project.plan("--", "all")
+    page = project.plan("--", "validation")
+    assert page == whole | {"validation": 1}
+
+
+def test_readme_leaves_measured_numbers_to_the_page():
+    section = (ROOT / "README.md").read_text(encoding="utf-8").split("## How long, how accurate")[1]
+    prose = re.sub(r"`[^`]*`|\]\([^)]*\)", "", section.split("\n## ")[0])
+    assert "docs/validation.md" in section
+    assert not re.search(r"\d", prose)
+
+
+def test_a_table_without_its_source_is_left_out_and_a_former_one_removed(benchmarked, tmp_path):
+    target = tmp_path / "tables"
+    target.mkdir()
+    (target / "scores.csv").write_text("of another campaign\n")
+    validation.collect(benchmarked, target, FOUND)
+    names = {path.stem for path in target.glob("*.csv")}
+    assert names == {
+        "pairs",
+        "random_scenes",
+        "methods",
+        "strain",
+        "run_times",
+        "oseen",
+    }
+
+
+def test_what_is_left_out_is_said_in_its_place(benchmarked, tmp_path):
+    validation.collect(benchmarked, tmp_path / "tables", FOUND)
+    text = validation.page(TEMPLATE, tmp_path / "tables")
+    for part in ("## Data set", "**Sweep**", "**Step size.**", "**Cost of a prediction.**"):
+        after = text.split(part)[1].split("\n\n**")[0].split("\n\n## ")[0]
+        assert re.search(r"^(\*\*)?.*\*Not measured in this campaign", after, re.M), part
+        assert not re.search(r"^\|", after, re.M), part
+
+
+def test_collecting_twice_gives_the_same_bytes(benchmarked, tmp_path):
+    for folder in ("one", "two"):
+        validation.collect(benchmarked, tmp_path / folder, FOUND)
+    one, two = (
+        {path.name: path.read_bytes() for path in (tmp_path / folder).iterdir()}
+        for folder in ("one", "two")
+    )
+    assert one == two
+
+
+def test_reduced_tables_keep_the_worst_of_what_they_reduce():
+    row = validation.random_scenes(SOLVER).iloc[0]
+    assert (row["error_max"], row["covered"], row["scenes"]) == (4e-3, 0.98, 150)
+    assert (row["fastest"], row["slowest"]) == (0.4, 2.2)
+    row = validation.strain(STRESS).iloc[0]
+    assert (row["clusters"], row["converged"], row["smallest_gap"]) == (2, 1, 0.1)
+    # What is out of reach has no part in the error of the converged, but in what is covered.
+    assert (row["error_max"], row["covered"]) == (1e-6, 0.5)
+    assert row[["apart", "moved", "turned", "alike"]].tolist() == [1e-5, 1e-8, 2e-7, 3e-7]
+
+
+def test_methods_stand_side_by_side_in_the_two_hardest_sets():
+    table = validation.methods(SOLVER).set_index("method")
+    assert table.loc["peer", ["dense_error", "contact_error"]].tolist() == [6e-2, 7e-2]
+    assert table["dense_milliseconds"].tolist() == [0.9, 0.3]
+
+
+def test_run_times_are_sums_over_the_jobs_of_a_stage(benchmarked):
+    table = validation.run_times(benchmarked / "benchmarks").set_index("stage")
+    assert table["core_seconds"].to_dict() == {"stokes": 5.5, "dataset": 0.5}
+    assert table["jobs"].to_dict() == {"stokes": 2, "dataset": 1}
+    assert table.loc["stokes", "memory"] == 350
+
+
+@pytest.mark.parametrize("value", [1e-4, 2.5e-8, 0.1, 1.0, 1000.0])
+def test_a_power_is_written_with_all_its_digits(value):
+    assert float(Written().format_field(value, "power")) == value
+
+
+@pytest.mark.parametrize("value", [0.0, 3.14159e-12, -3.14159e-5, 0.0314159, 0.314159, 31.4159])
+def test_an_error_is_written_to_two_digits(value):
+    assert float(Written().format_field(value, "error")) == pytest.approx(value, rel=0.02)
+
+
+@pytest.mark.parametrize("rest", [1e-12, 3.2e-9, 4.2e-5, 9.9e-4])
+def test_a_score_near_one_keeps_what_is_missing_to_one(rest):
+    one, minus = Written().format_field(1 - rest, "near_one").split(" - ")
+    assert (one, float(minus)) == ("1", pytest.approx(rest, rel=0.05))
+
+
+@pytest.mark.parametrize("value", [1.0, 0.998, 0.0, -1.5448])
+def test_another_score_has_four_decimals(value):
+    assert Written().format_field(value, "near_one") == f"{value:.4f}"
+
+
+def test_a_cell_falls_back_where_a_value_is_missing():
+    table = pd.DataFrame({"value": [1.0, None], "half": [0.1, None], "end": [2.0, 3.0]})
+    columns = {"a": ["{value:.0f} ± {half:.1f}", "at the end {end:.0f}"], "b": "{value:.1f}"}
+    assert markdown_table(table, columns).splitlines()[2:] == [
+        "| 1 ± 0.1 | 1.0 |",
+        "| at the end 3 |  |",
+    ]
+
+
+def test_a_bar_in_a_cell_does_not_end_it():
+    assert r"a \| b" in markdown_table(pd.DataFrame({"x": ["a | b"]}), {"": "{x}"})
+
+
+def test_a_wide_table_has_each_number_where_row_and_column_meet():
+    long = pd.DataFrame({"phi": [0.1, 0.1, 0.001], "n": [9, 20, 9], "v": [1.0, 2.0, 3.0]})
+    table = wide(long, "phi", "n")
+    assert table["phi"].tolist() == [0.1, 0.001]
+    assert table["v_9"].tolist() == [1.0, 3.0]
+    assert table["v_20"].isna().tolist() == [False, True]
+    with pytest.raises(ValueError, match="duplicate"):
+        wide(pd.concat([long, long]), "phi", "n")
+
+
+def test_a_table_without_rows_or_with_an_unknown_column_is_refused():
+    with pytest.raises(ValueError, match="without rows"):
+        markdown_table(pd.DataFrame({"x": []}), {"": "{x}"})
+    with pytest.raises(KeyError, match="speed"):
+        markdown_table(pd.DataFrame({"x": [1.0]}), {"": "{speed}"})
+
+
+def test_a_name_that_nothing_gives_is_refused(tmp_path):
+    (tmp_path / "page.md.jinja").write_text("{{ unheard_of }}")
+    with pytest.raises(jinja2.UndefinedError, match="unheard_of"):
+        render(tmp_path / "page.md.jinja", read_tables(tmp_path))

@@ -1,0 +1,28 @@
+# The page of the docs that holds the campaign's numbers, and the tables and pictures beside it.
+
+
+# Parts that a campaign may have or not: what is missing here has no section in the page.
+FURTHER = [
+    "results/benchmarks/solver.csv",
+    "results/benchmarks/spheres.csv",
+    "results/benchmarks/stress.csv",
+    "results/figures/accuracy_vs_cost.csv",
+    "results/studies/hypotheses.csv",
+    "results/studies/step_size.csv",
+]
+
+
+rule validation:
+    """Write this campaign's numbers into docs/: no part of `all`, as it changes the project."""
+    input:
+        campaign=rules.all.input,
+        further=[file for file in FURTHER if os.path.exists(file)],
+        template=ROOT / "docs" / "validation.md.jinja",
+    # Without an output it runs whenever it is asked for: the page at hand may be of another campaign.
+    log:
+        "logs/validation.log",
+    params:
+        docs="docs",
+        configuration=", ".join(os.path.relpath(file) for file in workflow.configfiles),
+    script:
+        "../scripts/validation.py"
