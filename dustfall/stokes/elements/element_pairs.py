@@ -33,8 +33,8 @@ class Side(NamedTuple):
     """One sphere of a pair with the quadrature that a tolerance asks for.
 
     corners: (e, 3, 3). nodes: (e, 6). unknowns: number of nodes. centre: (e, 3); reach: (e,), from
-    it to the farthest corner. far: distance, in reaches, from which each rule is enough. fewest: (e,),
-    number of the smallest rule that integrates the shape functions of the element. rules,
+    it to the farthest corner. far: distance, in reaches, from which each rule is enough. fewest:
+    (e,), number of the smallest rule that integrates the shape functions of the element. rules,
     weights: the rules. points: by rule, (e, 3, q); shapes: by rule, (e, 6, q), shape functions
     times weights. outer: number of the largest rule for the outer integral.
     """
