@@ -1,1 +1,5 @@
-"""Hydrodynamics of suspensions by the Rotne-Prager tensor: six spheres, periodic mobility."""
+"""Hydrodynamics of suspensions by the Rotne-Prager tensor: few spheres, and periodic cubes."""
+
+from dustfall.suspension.ewald import PeriodicMobility
+
+__all__ = ["PeriodicMobility"]

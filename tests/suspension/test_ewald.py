@@ -5,7 +5,7 @@ import pytest
 
 from dustfall.sedimentation.start import random_positions
 from dustfall.sedimentation.state import box_length
-from dustfall.suspension.ewald import PeriodicMobility
+from dustfall.suspension import PeriodicMobility
 from dustfall.suspension.periodic import HASIMOTO, RADIUS, periodic_mobility
 from dustfall.suspension.splitting import choose_splitting
 

@@ -22,8 +22,8 @@ import numpy as np
 from dustfall.columns import Column
 from dustfall.sedimentation.properties import Properties
 from dustfall.sedimentation.state import Closure, Drag, State
+from dustfall.suspension import PeriodicMobility
 from dustfall.suspension.conjugate_gradients import conjugate_gradients
-from dustfall.suspension.ewald import PeriodicMobility
 from dustfall.suspension.near_field import NearField
 from dustfall.suspension.splitting import Splitting, choose_splitting, splitting_with_waves
 
