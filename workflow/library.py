@@ -11,9 +11,11 @@ ROOT = Path(__file__).resolve().parent.parent
 WITHOUT_RESULTS = {"dustfall/extras.py", "dustfall/files.py", "dustfall/progress.py"}
 """They decide how a file is put in place and what a terminal shows, not what a result is."""
 
+SCRIPTS = ROOT / "workflow" / "scripts"
+
 
 def library_files(script: str | Path) -> list[str]:
-    """Files of `dustfall` that `script` imports, directly or through one another.
+    """Files of `dustfall`, and what scripts share, that `script` imports, be it through others.
 
     Sorted paths relative to the repository root. Imports inside functions count. What a package's
     __init__ imports counts only where a name is taken from the package and not from its module.
@@ -54,7 +56,7 @@ def _imported(path: Path) -> Iterator[Path]:
     for node in ast.walk(_tree(path)):
         if isinstance(node, ast.Import):
             for alias in node.names:
-                yield from _module(alias.name)
+                yield from _module(alias.name) or _shared(alias.name)
         elif isinstance(node, ast.ImportFrom):
             package = node.module or ""
             if node.level:
@@ -62,13 +64,18 @@ def _imported(path: Path) -> Iterator[Path]:
                 package = ".".join([*parents, *filter(None, [node.module])])
             for alias in node.names:
                 # `from package import name` names a module of the package, or what it holds.
-                module = _module(f"{package}.{alias.name}") or _module(package)
+                module = _module(f"{package}.{alias.name}") or _module(package) or _shared(package)
                 if module and module[0].stem == "__init__" and alias.name not in _names(module[0]):
                     raise ImportError(
                         f"{path} imports {alias.name} from {package}, whose __init__.py does not "
                         f"name it: import it from its module"
                     )
                 yield from module
+
+
+def _shared(name: str) -> list[Path]:
+    """File of what scripts share, but for their logs; none for other modules."""
+    return [file for file in [SCRIPTS / f"{name}.py"] if name != "joblog" and file.is_file()]
 
 
 def _module(name: str) -> list[Path]:

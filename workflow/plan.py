@@ -9,6 +9,9 @@ from zlib import crc32
 from dustfall.forces.features import KINDS
 from dustfall.forces.registry import settling_models, trained_models
 
+ALL_PARTICLES = "all_particles"
+"""What cases are called in which every particle feels all others, not its nearest neighbours."""
+
 
 class Case(NamedTuple):
     """One run of the sedimentation solver."""
@@ -17,8 +20,8 @@ class Case(NamedTuple):
     volume_fraction: float
     galileo_multiple: float
     seed: int = 1
-    compared_model: str = ""
-    """Force model beside that of `sedimentation.model`."""
+    compared: str = ""
+    """Force model beside that of `sedimentation.model`, or ALL_PARTICLES."""
 
     @property
     def start(self) -> str:
@@ -34,8 +37,8 @@ class Case(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Name that the files of the case have: of the start, and of a model that is compared."""
-        return f"{self.start}_{self.compared_model}" if self.compared_model else self.start
+        """Name that the files of the case have: of the start, and of what is compared."""
+        return f"{self.start}_{self.compared}" if self.compared else self.start
 
 
 def shards(config: dict) -> list[str]:
@@ -167,8 +170,13 @@ def cases(config: dict) -> dict[str, Case]:
             for multiple in galileo["multiples"]
         ),
         *(
-            Case(min(settle["particles"]), phi, 1.0, compared_model=model)
+            Case(min(settle["particles"]), phi, 1.0, compared=model)
             for model in compared_models(config)
+            for phi in settle["volume_fractions"]
+        ),
+        *(
+            Case(n, phi, 1.0, compared=ALL_PARTICLES)
+            for n in settle["all_particles"]["particles"]
             for phi in settle["volume_fractions"]
         ),
     ]
@@ -183,8 +191,8 @@ def cases(config: dict) -> dict[str, Case]:
 
 
 def force_model(config: dict, case: str) -> str:
-    """Force model of a case."""
-    return cases(config)[case].compared_model or config["sedimentation"]["model"]
+    """Force model of a case among nearest neighbours."""
+    return cases(config)[case].compared or config["sedimentation"]["model"]
 
 
 def start_file(config: dict, case: str) -> str | list[str]:

@@ -95,8 +95,14 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
+ALL_PARTICLES = "all_particles"
+"""What the closure of all particles has in place of a force model."""
+
+
 def model_title(model: str) -> str:
     """What a force model is called in a figure: its title, without one its name as it is."""
+    if model == ALL_PARTICLES:
+        return "all particles together"
     return registry.title(model) if model in registry.FORCE_MODELS else model
 
 
@@ -108,6 +114,8 @@ def model_look(model: str) -> dict:
     """
     first = [*FORMULAS, *registry.trained_models()]
     known = first + [name for name in registry.FORCE_MODELS if name not in first]
+    if model == ALL_PARTICLES:
+        return {"color": "black", "marker": MARKERS[-1]}
     if model not in known:
         return {"color": REFERENCE, "marker": MARKERS[0]}
     number = known.index(model)

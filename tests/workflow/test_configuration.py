@@ -66,7 +66,10 @@ def test_rules_read_every_key_and_no_other():
         ("idnn.layers", ["plan", "winner"]),
         ("idnn.training_of.anchored.epochs", ["model", "trial"]),
         ("dataset.test_share", ["plan", "sweep", "model", "trial", "learning_curve", "evaluation"]),
-        ("sedimentation.checkpoint_interval", ["sedimentation", "study_of_a_step"]),
+        (
+            "sedimentation.checkpoint_interval",
+            ["all_particles", "sedimentation", "study_of_a_step"],
+        ),
     ],
 )
 def test_a_key_is_read_by_the_rules_that_look_it_up_by_whatever_way(key, rules):

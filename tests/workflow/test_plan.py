@@ -52,6 +52,8 @@ def test_the_paper_takes_the_expected_jobs_and_fewer_than_a_thousand(project):
         # 3 numbers of particles, the fewest from 3 starts, 6 volume fractions, 2 more Galileo
         # numbers, 4 models to compare: three closed formulas and the anchored IDNN
         "sedimentation": (3 + 1 + 1) * 6 + 2 + 4 * 3 * 6,
+        # The fewest particles from 3 starts, ten times as many from one.
+        "all_particles": (3 + 1) * 6,
         "steady_state": 1,
         "independence_of_n": 1,
         "neighbour_changes": 1,
@@ -72,7 +74,7 @@ def test_figures_is_a_target_that_leaves_the_tables_out(project):
 
 
 def test_exports_is_a_target_with_every_case(project):
-    assert project.plan("--", "exports")["export"] == 5 * 6 + 2 + 12 * 6
+    assert project.plan("--", "exports")["export"] == 5 * 6 + 2 + 12 * 6 + 4 * 6
 
 
 @pytest.mark.parametrize(("number", "size"), [(120, 40), (121, 40), (119, 40), (120, 1000)])
@@ -106,7 +108,7 @@ def test_case_names_tell_cases_apart():
 
 
 def test_cases_of_the_galileo_series_are_added_once():
-    one = {"models": [], "seeds": [1]}
+    one = {"models": [], "seeds": [1], "all_particles": {"particles": []}}
     assert len(plan.cases(configure({"sedimentation": one}))) == 20
     apart = configure({"sedimentation": one | {"galileo": {"particles": 500}}})
     assert len(plan.cases(apart)) == 21
@@ -155,16 +157,31 @@ def test_learning_curve_ends_with_all_scenes_where_a_model_has_fewer():
     )
 
 
+def test_all_particles_start_where_nearest_neighbours_do():
+    cases = plan.cases(configure({}))
+    together = [case for case in cases.values() if case.compared == plan.ALL_PARTICLES]
+    assert len(together) == 6 * (3 + 1)
+    assert all(case.start in cases for case in together)
+
+
 def test_every_case_starts_from_its_own_random_numbers():
-    config = configure({"sedimentation": {"models": []}})
+    config = configure({"sedimentation": {"models": [], "all_particles": {"particles": []}}})
     items = [plan.start_stream(case.start) for case in plan.cases(config).values()]
     assert len(set(items)) == len(items)
 
 
 def test_compared_models_share_the_starts_of_the_smallest_cases():
-    config = configure({"sedimentation": {"models": ["isolated", "idnn"], "seeds": [2]}})
+    config = configure(
+        {
+            "sedimentation": {
+                "models": ["isolated", "idnn"],
+                "seeds": [2],
+                "all_particles": {"particles": []},
+            }
+        }
+    )
     cases = plan.cases(config)
-    compared = {name: case for name, case in cases.items() if case.compared_model}
+    compared = {name: case for name, case in cases.items() if case.compared}
     assert len(compared) == 6 * 2
     assert "n1000_phi1e-03_ga1_seed2_isolated" in compared
     for name, case in compared.items():

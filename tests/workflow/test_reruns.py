@@ -10,10 +10,17 @@ from workflow.readers import read_by, readers
 
 SMOKE = ("--configfile", "config/smoke.yaml")
 READERS = readers()
-CHOSEN_FROM = {"idnn.layers_of.dense", "sedimentation.galileo.multiples", "sedimentation.models"}
-"""Keys of models or cases that some of the rules which look the key up leave out."""
+CHOSEN_FROM = {
+    "idnn.layers_of.dense",
+    "scenes.number.uniform",
+    "sedimentation.galileo.multiples",
+    "sedimentation.models",
+}
+"""Keys of models, cases or scenes, of which some of the rules that look them up take a part."""
 
 SHARDS = {"scenes": 5, "stokes": 5}
+MESHED = {"scene_mesh": 3, "figure_scene_meshes": 1}
+AUDIT = {"audit": 1, "figure_audit": 1}
 DATA_FIGURES = {"figure_force_scatter": 1, "figure_force_pdf": 1, "figure_spearman": 1}
 SCORES = {"evaluation": 1, "figure_predicted_vs_target": 1, "figure_error_by_distance": 1}
 TRIALS = {"trial": 13, "learning_curve": 1, "ablation": 1, "figure_learning_curve": 1}
@@ -66,14 +73,14 @@ def changed_themselves(words: str) -> set[str]:
 @pytest.mark.parametrize(
     ("setting", "expected"),
     [
-        ("scenes={phi_max: 5.0e-4}", SHARDS | FROM_DATA),
+        ("scenes={phi_max: 5.0e-4}", SHARDS | MESHED | AUDIT | FROM_DATA),
         # A fourth shard, and all that depends on the data set.
         (
             "scenes={number: {uniform: 150}}",
-            {"scenes": 1, "stokes": 1} | FROM_DATA,
+            {"scenes": 1, "stokes": 1} | AUDIT | FROM_DATA,
         ),
         ("meshing={study_sizes: [0.9, 0.7, 0.5]}", {"mesh_study": 1, "figure_mesh_study": 1}),
-        ("stokes={tolerance: 1.0e-3}", {"stokes": 5} | FROM_DATA),
+        ("stokes={tolerance: 1.0e-3}", {"stokes": 5} | MESHED | AUDIT | FROM_DATA),
         ("dataset={unconverged_share: 0.02}", FROM_DATA),
         ("dataset={test_share: 0.2}", MODELS | SETTLING),
         (
@@ -94,7 +101,11 @@ def changed_themselves(words: str) -> set[str]:
             "idnn={learning_curve: [40, 60, 80]}",
             {"trial": 2, "learning_curve": 1, "figure_learning_curve": 1},
         ),
-        ("sedimentation={step: 0.05}", ALL_SETTLING),
+        ("sedimentation={step: 0.05}", ALL_SETTLING | {"all_particles": 3}),
+        (
+            "sedimentation={all_particles: {fluid: quasi_steady}}",
+            {"all_particles": 3} | STEADY_TABLE,
+        ),
         (
             "sedimentation={galileo: {multiples: [1, 2, 3]}}",
             {
@@ -133,11 +144,12 @@ def test_an_edited_key_reruns_what_depends_on_it_and_nothing_else(rehearsal, set
 @pytest.mark.parametrize(
     ("file", "expected"),
     [
-        ("scenes.py", SHARDS | FROM_DATA),
-        ("stokes/records.py", {"stokes": 5} | FROM_DATA),
+        ("scenes.py", SHARDS | MESHED | AUDIT | FROM_DATA),
+        ("stokes/records.py", {"stokes": 5} | AUDIT | FROM_DATA),
         ("dataset.py", FROM_DATA),
         ("training/fit.py", MODELS | SETTLING),
-        ("sedimentation/settle.py", ALL_SETTLING),
+        ("sedimentation/settle.py", ALL_SETTLING | {"all_particles": 3}),
+        ("suspension/ewald.py", {"all_particles": 3} | STEADY_TABLE),
         ("analysis/voronoi.py", {"random_spheres": 1, **CELLS, "figure_voronoi_variance": 1}),
         ("figures/mesh.py", {"figure_mesh_study": 1}),
         ("progress.py", {}),

@@ -74,7 +74,7 @@ rule independence_of_n:
 rule neighbour_changes:
     """Count how often the five nearest neighbours change."""
     input:
-        series=expand("results/sedimentation/{case}.series.nc", case=CASES),
+        series=expand("results/sedimentation/{case}.series.nc", case=NEIGHBOUR_CASES),
     output:
         report(
             "results/analysis/neighbour_changes.csv",

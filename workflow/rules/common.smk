@@ -46,11 +46,12 @@ MESHES = expand(
 )
 CASES = plan.cases(config)
 
-# The cases of `sedimentation.model` at the Galileo number of the properties; those of them with most
+# The cases among nearest neighbours; those of `sedimentation.model` at the Galileo number of the properties; those of them with most
 # particles, from dilute to dense and from one start each; and the cases that differ in the Galileo
 # number alone.
+NEIGHBOUR_CASES = [name for name, case in CASES.items() if case.compared != plan.ALL_PARTICLES]
 PLAIN_CASES = [
-    name for name, case in CASES.items() if case.galileo_multiple == 1 and not case.compared_model
+    name for name, case in CASES.items() if case.galileo_multiple == 1 and not case.compared
 ]
 LARGEST_CASES = [
     name
@@ -62,7 +63,7 @@ LARGEST_CASES = [
 GALILEO_CASES = [
     name
     for name, case in CASES.items()
-    if not case.compared_model
+    if not case.compared
     and case.particles == config["sedimentation"]["galileo"]["particles"]
     and case.volume_fraction == config["sedimentation"]["galileo"]["volume_fraction"]
 ]

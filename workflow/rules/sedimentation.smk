@@ -1,5 +1,5 @@
 rule sedimentation:
-    """Let the particles of one case settle."""
+    """Let the particles of one case settle among their nearest neighbours."""
     input:
         model=lambda wc: trained(plan.force_model(config, wc.case)),
         start=lambda wc: plan.start_file(config, wc.case),
@@ -10,6 +10,8 @@ rule sedimentation:
         "logs/sedimentation/{case}.log",
     benchmark:
         "benchmarks/sedimentation/{case}.tsv"
+    wildcard_constraints:
+        case=r"(?!.*_all_particles\b)[\w.+-]+",
     threads: config["sedimentation"]["threads"]
     # Not a parameter, because it changes no result.
     resources:
@@ -31,3 +33,39 @@ rule sedimentation:
         precision=config["sedimentation"]["precision"],
     script:
         "../scripts/settle.py"
+
+
+rule all_particles:
+    """Let the particles of one case settle, all of them coupled through the fluid."""
+    input:
+        start=lambda wc: plan.start_file(config, wc.case),
+    output:
+        trajectory="results/sedimentation/{case}.nc",
+        series="results/sedimentation/{case}.series.nc",
+    log:
+        "logs/sedimentation/{case}.log",
+    benchmark:
+        "benchmarks/sedimentation/{case}.tsv"
+    wildcard_constraints:
+        case=r"[\w.+-]+_all_particles",
+    threads: config["sedimentation"]["threads"]
+    resources:
+        checkpoint_interval=config["sedimentation"]["checkpoint_interval"],
+    params:
+        library=library("settle_all_particles.py"),
+        seed=config["seed"],
+        stream=lambda wc: plan.start_stream(CASES[wc.case].start),
+        particles=lambda wc: CASES[wc.case].particles,
+        volume_fraction=lambda wc: CASES[wc.case].volume_fraction,
+        galileo_multiple=lambda wc: CASES[wc.case].galileo_multiple,
+        change=config["sedimentation"]["galileo"]["change"],
+        properties=config["sedimentation"]["properties"],
+        fluid=config["sedimentation"]["all_particles"]["fluid"],
+        tolerance=config["sedimentation"]["all_particles"]["tolerance"],
+        start=config["sedimentation"]["start"],
+        step=config["sedimentation"]["step"],
+        duration=config["sedimentation"]["duration"],
+        save_every=config["sedimentation"]["save_every"],
+        precision=config["sedimentation"]["precision"],
+    script:
+        "../scripts/settle_all_particles.py"

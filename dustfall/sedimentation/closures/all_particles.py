@@ -212,6 +212,7 @@ class AllParticles(Closure):
         """Return what results depend on."""
         return {
             **super().settings(),
+            "model": self.name,
             "fluid": self.fluid,
             "shortest_memory": self.shortest_memory,
             "tolerance": self.tolerance,
