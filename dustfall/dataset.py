@@ -13,8 +13,13 @@ import pandas as pd
 
 from dustfall.columns import Column, read_columns, write_columns
 from dustfall.scenes import LAWS, SCENE_COLUMNS
-from dustfall.solution import SOLUTION_COLUMNS, Status
+from dustfall.solution import Status
 from dustfall.streams import Purpose, stream
+
+SOLUTION_COLUMNS = (
+    "scene", "force", "status", "error_estimate", "iterations", "residual", "minimum_gap",
+)  # fmt: skip
+"""Columns of a shard of force records that the data set reads."""
 
 COLUMNS = {
     "neighbours": SCENE_COLUMNS["neighbours"],

@@ -8,11 +8,6 @@ from enum import StrEnum
 
 import numpy as np
 
-SOLUTION_COLUMNS = (
-    "scene", "force", "status", "error_estimate", "iterations", "residual", "minimum_gap",
-)  # fmt: skip
-"""Columns of a shard of force records that other stages read."""
-
 
 class Status(StrEnum):
     """How a solve ended."""

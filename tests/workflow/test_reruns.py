@@ -146,7 +146,7 @@ def test_an_edited_key_reruns_what_depends_on_it_and_nothing_else(rehearsal, set
     [
         ("scenes.py", SHARDS | MESHED | AUDIT | FROM_DATA),
         ("stokes/records.py", {"stokes": 5} | AUDIT | FROM_DATA),
-        ("dataset.py", FROM_DATA),
+        ("dataset.py", AUDIT | FROM_DATA),
         ("training/fit.py", MODELS | SETTLING),
         ("sedimentation/settle.py", ALL_SETTLING | {"all_particles": 3}),
         ("suspension/ewald.py", {"all_particles": 3} | STEADY_TABLE),

@@ -8,9 +8,9 @@ import pandas as pd
 import joblog
 from dustfall.benchmarks.audit import TOLERANCE, audit, audit_sample, require_agreement
 from dustfall.columns import read_columns
+from dustfall.dataset import SOLUTION_COLUMNS
 from dustfall.files import atomic
 from dustfall.scenes import SCENE_COLUMNS
-from dustfall.solution import SOLUTION_COLUMNS
 
 progress, params = joblog.start(snakemake.log[0]), snakemake.params
 other = "multipole" if params.method == "elements" else "elements"
