@@ -1,4 +1,5 @@
-# `make run` and `make test`: each sets up all that it needs, then does its one job.
+# `make run` and `make test`: each sets up all that it needs, then does its one job. `make openfoam`
+# builds the plugin, `make openfoam-test` holds it to the Python package.
 
 CONFIG ?= config/config.yaml
 PYTHON ?= python3
@@ -9,13 +10,19 @@ GMSH_LIBRARIES := libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 libgomp1
 CAN_INSTALL := [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null
 APT_INSTALL := apt-get update && apt-get install -y --no-install-recommends
 
-.PHONY: run test environment gmsh-libraries clean-environment
+.PHONY: run test openfoam openfoam-test environment gmsh-libraries clean-environment
 
 run: environment
 	$(VENV)/bin/snakemake --configfile $(CONFIG) -- all
 
 test: environment
-	$(VENV)/bin/python -m pytest -n auto --dist loadfile
+	$(VENV)/bin/python -m pytest -n auto --dist loadfile -m "not openfoam"
+
+openfoam:
+	openfoam/build.sh
+
+openfoam-test: environment openfoam
+	$(VENV)/bin/python -m pytest tests/openfoam
 
 # Made anew when it is missing, or when requirements.txt is not the one that it was made from.
 environment:
