@@ -88,6 +88,7 @@ rule studies:
     """What numerical settings do to the results; no part of `all`."""
     input:
         "results/studies/step_size.csv",
+        "results/studies/neighbour_numbers.csv",
 
 
 rule configuration:

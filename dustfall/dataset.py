@@ -223,7 +223,9 @@ def _read_shard(shard: Shard) -> tuple[Dataset, pd.DataFrame]:
             "radial_law": law,
             "scene": number,
             "volume_fraction": part.volume_fraction,
-            "converged": solutions["status"] != Status.NOT_CONVERGED,
+            # A mesh that is out of reach of a gap leaves no force.
+            "converged": (solutions["status"] != Status.NOT_CONVERGED)
+            & np.isfinite(part.force).all(axis=1),
             "error_estimate": solutions["error_estimate"][:, 0],
             **{name: solutions[name] for name in ("iterations", "residual", "minimum_gap")},
         }

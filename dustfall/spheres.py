@@ -16,7 +16,7 @@ def checked_numbers(name: str, values) -> np.ndarray:
     """An own array of floats; ValueError for words, holes and rows of different lengths."""
     try:
         return np.array(values, dtype=float)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise ValueError(f"{name} must be an array of numbers: {error}") from None
 
 

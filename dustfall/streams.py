@@ -26,8 +26,10 @@ class Purpose(IntEnum):
     FROZEN_CLOUD = 12  # cloud
     BOOTSTRAP = 13  # number of samples
     AUDIT = 14  # radial law, decade
-    BENCHMARK = 15  # set, number
+    BENCHMARK = 15  # number of spheres
     STRESS = 16  # test, number
+    TRUNCATION = 17  # kind of cluster, number
+    EXPORT = 18
 
 
 def stream(purpose: Purpose, seed: int, *items: int) -> np.random.Generator:

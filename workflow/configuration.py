@@ -13,6 +13,8 @@ import yaml
 
 from dustfall.forces.registry import settling_models, trained_models
 from dustfall.scenes import LAWS
+from dustfall.sedimentation.state import box_length
+from dustfall.suspension.near_field import REACH
 from workflow.readers import read_by, readers
 
 SCHEMA = Path(__file__).parent / "schemas" / "config.schema.yaml"
@@ -219,6 +221,20 @@ def _check_physics(config: dict) -> None:
         f"sedimentation.properties.fluid_density, which is {fluid:g} kg/m³.",
     )
     studies = config["studies"]
+    most, fewest = max(studies["neighbours"]), min(settle["particles"])
+    _require(
+        most < fewest,
+        f"studies.neighbours goes up to {most}, but must stay below the smallest of "
+        f"sedimentation.particles, which is {fewest}.",
+    )
+    densest = max(settle["volume_fractions"])
+    for particles in settle["all_particles"]["particles"]:
+        length, needed = box_length(particles, densest), 2 * REACH
+        _require(
+            length > needed,
+            f"sedimentation.all_particles.particles is {particles}, but must be so many that the "
+            f"cube is longer than {needed:g} diameters at phi = {densest:g}; it is {length:.3g}.",
+        )
     for step in studies["steps"]:
         _require_multiple("studies.duration", studies["duration"], "one of studies.steps", step)
     latest = studies["duration"] - STEADY_STEPS * max(studies["steps"])

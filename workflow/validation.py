@@ -26,9 +26,10 @@ from dustfall.analysis.references import (
     PAPER_SETTLING,
 )
 from dustfall.benchmarks.solver import MULTIPOLE
-from dustfall.forces.registry import title
+from dustfall.figures.style import ALL_PARTICLES, model_title
 from dustfall.scenes import LAWS
 from dustfall.sedimentation.properties import Properties
+from dustfall.sedimentation.state import box_length
 from dustfall.stokes import Status, fixed_spheres
 from dustfall.stokes.references.exact_pairs import forces_on_two_spheres
 from dustfall.units import COMPONENTS, RADIUS, SPHERE_VOLUME, STOKES_DRAG
@@ -42,6 +43,7 @@ PICTURES = {
         f"{name}.png": f"results/figures/{name}.png"
         for name in (
             "accuracy_vs_cost",
+            "audit",
             "cloud_spectra",
             "error_by_distance",
             "force_pdf",
@@ -50,6 +52,7 @@ PICTURES = {
             "learning_curve",
             "mesh_study",
             "predicted_vs_target",
+            "scene_meshes",
             "trajectories",
             "trajectories_3d",
             "voronoi_variance",
@@ -209,6 +212,22 @@ def strain(stress: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows).sort_values("tolerance", ascending=False, ignore_index=True)
 
 
+def audit(table: pd.DataFrame) -> pd.DataFrame:
+    """Scenes solved by another method too: one row a law and method, all over 24.
+
+    excess is the difference of the forces over the sum of both estimates.
+    """
+    grouped = table.groupby(["radial_law", "method"], sort=False, as_index=False)
+    return grouped.agg(
+        scenes=("scene", "size"),
+        smallest_gap=("minimum_gap", "min"),
+        difference=("difference", "median"),
+        largest=("difference", "max"),
+        estimate=("estimate", "median"),
+        excess=("excess", "max"),
+    )
+
+
 def meshes(study: pd.DataFrame, convergence: pd.DataFrame) -> pd.DataFrame:
     """Finest mesh of each discretisation: one row a scheme, with its convergence if it is flat.
 
@@ -264,7 +283,7 @@ def scores(evaluation: pd.DataFrame, violations: pd.DataFrame) -> pd.DataFrame:
     table = table.merge(paper, on=["radial_law", "model"], how="left")
     asymmetry = violations.groupby("model")["rms"].max()
     table = table.assign(
-        title=table["model"].map(title), asymmetry=table["model"].map(asymmetry)
+        title=table["model"].map(model_title), asymmetry=table["model"].map(asymmetry)
     ).sort_values("r2_streamwise")
     return _in_order(table, "radial_law", LAWS).drop(columns="model")
 
@@ -292,7 +311,7 @@ def sweep(summary: pd.DataFrame) -> pd.DataFrame:
 def cost(accuracy: pd.DataFrame) -> pd.DataFrame:
     """Time of a prediction: one row a model, the cheapest first."""
     table = accuracy.drop_duplicates("model")[["model", "microseconds"]]
-    table = table.assign(title=table["model"].map(title))
+    table = table.assign(title=table["model"].map(model_title))
     return table.sort_values("microseconds", ignore_index=True)
 
 
@@ -307,6 +326,11 @@ def settling(steady: pd.DataFrame, configuration: dict) -> pd.DataFrame:
     )
     paper = PAPER_SETTLING[PAPER_SETTLING["quantity"] == "inverse_beta"]
     return _with_paper(table, paper).sort_values(["volume_fraction", "n"], ignore_index=True)
+
+
+def neighbour_numbers(table: pd.DataFrame) -> pd.DataFrame:
+    """Settling velocity by number of neighbours; a point of the paper stands bare, a bound not."""
+    return table.assign(relation=table["relation"].replace("=", None))
 
 
 def galileo(steady: pd.DataFrame, configuration: dict) -> pd.DataFrame:
@@ -329,8 +353,24 @@ def models(steady: pd.DataFrame, configuration: dict) -> pd.DataFrame:
     ]
     own = own.sort_values("galileo").drop_duplicates(["model", "volume_fraction"])
     table = _steady_columns(own)
-    table = table.assign(title=table["model"].map(title))
+    table = table.assign(title=table["model"].map(model_title))
     return table.sort_values(["volume_fraction", "model"], ignore_index=True)
+
+
+def all_particles(steady: pd.DataFrame) -> pd.DataFrame:
+    """Clouds of which all particles feel each other: one row a phi and number of particles."""
+    own = steady[steady["model"] == ALL_PARTICLES]
+    if own.empty:
+        return own
+    velocity = own[own["quantity"] == "settling_velocity_mean"]
+    table = _steady_columns(velocity)
+    for quantity in ("settling_velocity_variance", "box_reynolds", "memory_from"):
+        last = own[own["quantity"] == quantity].set_index(["n", "volume_fraction"])["end"]
+        table = table.join(last.rename(quantity), on=["n", "volume_fraction"])
+    length = [
+        box_length(n, phi) for n, phi in zip(table["n"], table["volume_fraction"], strict=True)
+    ]
+    return table.assign(box_length=length).sort_values(["volume_fraction", "n"], ignore_index=True)
 
 
 def oseen(configuration: dict) -> pd.DataFrame:
@@ -497,7 +537,9 @@ TABLES: dict[str, tuple[Callable[..., pd.DataFrame], tuple[str, ...]]] = {
     "models": (models, (STEADY_STATE, CONFIGURATION)),
     "oseen": (oseen, (CONFIGURATION,)),
     "independence": (pd.DataFrame, ("results/analysis/independence_of_n.csv",)),
-    "hypotheses": (pd.DataFrame, ("results/studies/hypotheses.csv",)),
+    "neighbour_numbers": (neighbour_numbers, ("results/studies/neighbour_numbers.csv",)),
+    "audit": (audit, ("results/analysis/audit.csv",)),
+    "all_particles": (all_particles, (STEADY_STATE,)),
     "frozen_cloud": (frozen_cloud, (FROZEN_CLOUD,)),
     "neighbours": (neighbours, (FROZEN_CLOUD,)),
     "steps": (pd.DataFrame, ("results/studies/step_size.csv",)),
@@ -558,5 +600,5 @@ def page(template: Path, folder: Path) -> str:
         read_tables(folder),
         provenance=json.loads((folder / "provenance.json").read_text(encoding="utf-8")),
         config=yaml.safe_load((folder / "config.yaml").read_text(encoding="utf-8")),
-        title=title,
+        title=model_title,
     )

@@ -1,7 +1,7 @@
 // The nearest neighbours of points, exactly, with periodic images along any of the three axes.
 //
 // Plain C++11, no library needed. Every other point counts once, at its nearest image. What a
-// search returns hangs on positions and keys alone, not on the order of the points: distances are
+// search returns depends on positions and keys alone, not on the order of the points: distances are
 // computed in one way everywhere, and where two are equal the point with the lower key comes first.
 
 #ifndef DUSTFALL_NEAREST_NEIGHBOURS_HPP

@@ -12,7 +12,7 @@ from dustfall.streams import Purpose, stream
 from dustfall.units import STOKES_DRAG
 
 TOLERANCE = 1e-4
-"""Tolerance of the audit's own solves, unless the campaign's is larger: what meshes of a hundred
+"""Tolerance of the audit's own solves, unless the campaign's is larger: what meshes of 48 to 80
 elements a sphere reach in milliseconds. The estimates say what it is worth in each scene."""
 
 

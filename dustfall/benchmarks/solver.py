@@ -15,6 +15,7 @@ from dustfall.stokes.elements.outer_sphere import forces_in_outer_sphere
 from dustfall.stokes.methods import fixed_spheres
 from dustfall.stokes.references.fundamental_solutions import reference_forces
 from dustfall.stokes.references.multiblob import multiblob_forces
+from dustfall.streams import Purpose, stream
 from dustfall.units import STOKES_DRAG
 
 with extra("benchmarks"):
@@ -135,7 +136,7 @@ def time_against_spheres(
     """
     rows = []
     for n in numbers:
-        centres = _random_cloud(n, 0.01, np.random.default_rng([seed, n]))
+        centres = _random_cloud(n, 0.01, stream(Purpose.BENCHMARK, seed, n))
         seconds = []
         for _ in range(repeats + 1):
             start = time.perf_counter()

@@ -24,6 +24,9 @@ from dustfall.units import CONTACT, FORCE_UNIT, RADIUS, STOKES_DRAG
 FLOW = np.array([0.36, 0.8, 0.48])
 """Unit flow in no special direction of the clusters."""
 
+CROWDS, TURNS, MESH_TURN = range(3)
+"""Items of the random streams."""
+
 CLUSTERS = {
     "pair": np.array([[0, 0, 0], [0, 0, 1]]),
     "triangle": np.array([[0, 0, 0], [1, 0, 0], [0.5, np.sqrt(0.75), 0]]),
@@ -94,7 +97,7 @@ def _crowds():
         near = (CONTACT + gap) * CLUSTERS["pair"] @ _FACING
         yield "pair and a square far off", np.vstack([near, _square(distance)])
     for item, (number, distance) in enumerate(((1, 5.0), (4, 20.0), (24, 60.0))):
-        rng = stream(Purpose.STRESS, 1, len(CLUSTERS), item)
+        rng = stream(Purpose.STRESS, 1, CROWDS, item)
         for name in ("pair", "chain of three"):
             near = 1.003 * CLUSTERS[name] @ _FACING
             yield f"{name} among {number} far", np.vstack([near, _ring(number, distance, rng)])
@@ -152,7 +155,7 @@ def invariances(tolerances, gap=0.01, seed: int = 1) -> pd.DataFrame:
     force by as little.
     """
     centres = (1.0 + gap) * CLUSTERS["six"]
-    rng = np.random.default_rng(seed)
+    rng = stream(Purpose.STRESS, seed, TURNS)
     rows = []
     for tolerance in tolerances:
 
@@ -176,7 +179,7 @@ def invariances(tolerances, gap=0.01, seed: int = 1) -> pd.DataFrame:
 def turned_mesh(edge: float = 0.5, seed: int = 1) -> pd.DataFrame:
     """The answer of a template and of the same template turned: relative change, at most."""
     mesh = sphere_mesh(edge)
-    turn = Rotation.random(rng=np.random.default_rng(seed)).as_matrix()
+    turn = Rotation.random(rng=stream(Purpose.STRESS, seed, MESH_TURN)).as_matrix()
     response = OneBody.from_mesh(mesh).response
     turned = OneBody.from_mesh(SphereMesh(mesh.vertices @ turn.T, mesh.triangles)).response
     change = np.abs(turned - response).max() / response.max()

@@ -42,7 +42,7 @@ def sampled(number: int, seed: int = 1, progress=None) -> pd.DataFrame:
     rows = []
     for kind, name in enumerate(KINDS):
         for item in range(number):
-            rng = stream(Purpose.STRESS, seed, kind, item)
+            rng = stream(Purpose.TRUNCATION, seed, kind, item)
             centres = _cluster(name, rng)
             n, distance = len(centres), centre_distances(centres)
             flow = rng.standard_normal(3)

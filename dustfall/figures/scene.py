@@ -12,7 +12,7 @@ from dustfall.figures.style import DOUBLE, letter, new_figure, require, styled
 VIEW = (18.0, -50.0)
 """Elevation and azimuth [degrees] from which scenes are seen."""
 
-RIM = 0.35
+RIM = 0.75
 """Cosine of the angle behind the outline of a sphere up to which elements are drawn."""
 
 COLOURS = "RdBu_r"
@@ -68,7 +68,7 @@ def _draw(ax, rows, colours):
     ax.add_collection3d(
         Poly3DCollection(
             nodes[seen], facecolors=colours.to_rgba(pressure[seen]), edgecolors="0.25",
-            linewidths=0.25,
+            linewidths=0.25, clip_on=False,
         )
     )  # fmt: skip
     low, high = nodes.reshape(-1, 3).min(axis=0), nodes.reshape(-1, 3).max(axis=0)
@@ -77,7 +77,7 @@ def _draw(ax, rows, colours):
         f"{name}lim": (0.5 * (a + b) - half, 0.5 * (a + b) + half)
         for name, a, b in zip("xyz", low, high, strict=True)
     })  # fmt: skip
-    ax.set_box_aspect((1.0, 1.0, 1.0), zoom=1.45)
+    ax.set_box_aspect((1.0, 1.0, 1.0), zoom=1.3)
     ax.set_proj_type("ortho")
     ax.view_init(elevation, azimuth)
     ax.set_axis_off()

@@ -91,7 +91,7 @@ def inverse_beta(frame: pd.DataFrame) -> Figure:
         order = np.argsort(np.logical_not(ours), kind="stable")
         ax.legend([handles[i] for i in order], [labels[i] for i in order], loc="upper left")
     left.set_title(f"(a) {model_title(principal)}", loc="left")
-    right.set_title(f"(b) force models, {number_label(compared[0][1]['n'].iloc[0])}", loc="left")
+    right.set_title(f"(b) models compared, {number_label(compared[0][1]['n'].iloc[0])}", loc="left")
     left.set_ylabel(r"$\langle v_s\rangle / v_{s,\mathrm{Stokes}} = 1/\beta$")
     if (simulation["status"] != STEADY).any():
         note = "filled: steady, 95 % interval; hollow: not steady, end of the run, arrow: its drift"

@@ -17,6 +17,7 @@ from dustfall.forces.features import FADING, KINDS
 from dustfall.forces.formula import Formula
 from dustfall.forces.formulas.reflections import REFLECTIONS, pair_correction
 from dustfall.forces.learned import ACTIVATION, LearnedModel, Network
+from dustfall.streams import Purpose, stream
 from dustfall.units import COMPONENTS, CONTACT, NEIGHBOURS
 
 FORMAT = "dustfall exported force model"
@@ -86,7 +87,7 @@ def exported(model: LearnedModel | Formula, neighbours: int = NEIGHBOURS) -> dic
 
 def _test_scenes(neighbours: int) -> np.ndarray:
     """Scenes (m, k, 3) of all sizes, and some where a rule for ties or contact decides."""
-    rng = np.random.default_rng(0)
+    rng = stream(Purpose.EXPORT, 0)
     direction = rng.normal(size=(2 * len(REACHES), neighbours, 3))
     direction /= np.linalg.norm(direction, axis=2, keepdims=True)
     reach = np.repeat(REACHES, 2)[:, None, None]

@@ -6,6 +6,7 @@ The flow frame has x spanwise, y streamwise (the flow runs along +y) and z verti
 import numpy as np
 from numba import njit
 
+from dustfall.spheres import LARGEST
 from dustfall.units import CONTACT
 
 MOST_NEIGHBOURS = 50
@@ -86,8 +87,8 @@ def spherical_coordinates(positions) -> np.ndarray:
 def check_neighbours(neighbours, number: int | None = None) -> np.ndarray:
     """Return the neighbours as contiguous float64 (m, k, 3), or raise ValueError.
 
-    A wrong shape, another `number` k than the given one, a value that is not finite and a
-    neighbour at the centre of the reference sphere (it has no direction) are refused.
+    A wrong shape, another `number` k than the given one, a value that is not finite or beyond
+    LARGEST and a neighbour at the centre of the reference sphere (it has no direction) are refused.
     """
     neighbours = np.ascontiguousarray(neighbours, dtype=float)
     allowed = range(1, MOST_NEIGHBOURS + 1) if number is None else (number,)
@@ -100,6 +101,10 @@ def check_neighbours(neighbours, number: int | None = None) -> np.ndarray:
     if not np.isfinite(neighbours).all():
         scene = int(np.flatnonzero(~np.isfinite(neighbours).all(axis=(1, 2)))[0])
         raise ValueError(f"neighbours of scene {scene} hold a value that is not finite")
+    far = np.abs(neighbours) > LARGEST
+    if far.any():
+        scene = int(np.argwhere(far)[0, 0])
+        raise ValueError(f"neighbours of scene {scene} are beyond {LARGEST:g} d_p")
     # Squares, because their underflow to zero is what would divide by zero later.
     central = np.einsum("mjk,mjk->mj", neighbours, neighbours) == 0.0
     if central.any():

@@ -1,6 +1,6 @@
 """Sedimentation of monodisperse spheres in a periodic cube of fluid at rest."""
 
-from dustfall.sedimentation.closures import NearestNeighbours
+from dustfall.sedimentation.closures import AllParticles, NearestNeighbours
 from dustfall.sedimentation.neighbours import nearest_neighbours
 from dustfall.sedimentation.properties import Properties
 from dustfall.sedimentation.settle import Checkpoint, Output, Schedule, settle
@@ -8,6 +8,7 @@ from dustfall.sedimentation.start import random_positions, random_start, start_f
 from dustfall.sedimentation.state import Closure, Drag, State, box_length, move, step
 
 __all__ = [
+    "AllParticles",
     "Checkpoint",
     "Closure",
     "Drag",

@@ -78,8 +78,8 @@ def wrap(position, box_length):
     for i in range(len(position)):
         for axis in range(3):
             x = position[i, axis] - box_length * np.floor(position[i, axis] / box_length)
-            # A tiny negative coordinate wraps onto the far face by rounding.
-            wrapped[i, axis] = x if x < box_length else 0.0
+            # Rounding puts a coordinate just below a multiple of the side outside the cube.
+            wrapped[i, axis] = x if 0.0 <= x < box_length else 0.0
     return wrapped
 
 

@@ -17,7 +17,7 @@ from dustfall.columns import Column
 from dustfall.files import remove_leftovers
 from dustfall.sedimentation import checkpoint as checkpoints
 from dustfall.sedimentation.properties import Properties
-from dustfall.sedimentation.state import Closure, Drag, State, move
+from dustfall.sedimentation.state import Closure, Drag, State, check_step, move
 from dustfall.sedimentation.trajectory import (
     SERIES,
     TRACKED,
@@ -138,10 +138,12 @@ def settle(
 
     Raises
     ------
-    ValueError : the checkpoint is of a run with other settings.
+    ValueError : the checkpoint is of a run with other settings, or the closure is made for another
+        step.
     FloatingPointError : the drag is not finite.
     SystemExit : SIGTERM came, and the state was saved.
     """
+    check_step(closure, schedule.step)
     tracked = output.tracked(len(start.position))
     settings = {
         "dustfall_version": __version__,
@@ -177,12 +179,11 @@ def settle(
             if state.steps == schedule.steps:
                 break
             state = move(state, drag, schedule.step, properties.stokes_number)
-            if checkpoint is not None and (
-                terminated() or time.monotonic() - saved >= checkpoint.interval
-            ):
+            stop = terminated()
+            if checkpoint is not None and (stop or time.monotonic() - saved >= checkpoint.interval):
                 _save(folder, settings, state, closure, frames, rows)
                 saved = time.monotonic()
-            if terminated():
+            if stop:
                 kept = f"state saved in {folder}" if checkpoint is not None else "nothing saved"
                 raise SystemExit(f"terminated after step {state.steps} of {schedule.steps}, {kept}")
         seconds = time.monotonic() - began
@@ -260,21 +261,25 @@ def _save(folder: Path, settings, state: State, closure: Closure, frames: Record
 def _resume(folder: Path, settings: dict, closure: Closure, frame: np.dtype, row: np.dtype):
     """The state to go on from, if any, and the records that belong to it, cut back to it."""
     for saved in checkpoints.load(folder, settings):
-        with suppress(ValueError):
+        # Records shorter than a state, or lost, leave the state before it, or a start anew.
+        with suppress(ValueError, FileNotFoundError):
             frames = Records(folder / "frames.bin", frame, int(saved["frames"]))
             rows = Records(folder / "series.bin", row, int(saved["rows"]))
-            drag = Drag(saved["beta"], saved["force"], bool(saved["whole_step"]))
-            fraction, steps = settings["volume_fraction"], int(saved["steps"])
-            closure.remember(
-                {
-                    name.removeprefix("closure."): array
-                    for name, array in saved.items()
-                    if name.startswith("closure.")
-                }
-            )
-            state = State(saved["position"], saved["velocity"], fraction, steps, drag)
-            return state, frames, rows
-    return None, Records(folder / "frames.bin", frame), Records(folder / "series.bin", row)
+            break
+    else:
+        closure.remember({})
+        return None, Records(folder / "frames.bin", frame), Records(folder / "series.bin", row)
+    closure.remember(
+        {
+            name.removeprefix("closure."): array
+            for name, array in saved.items()
+            if name.startswith("closure.")
+        }
+    )
+    drag = Drag(saved["beta"], saved["force"], bool(saved["whole_step"]))
+    fraction, steps = settings["volume_fraction"], int(saved["steps"])
+    state = State(saved["position"], saved["velocity"], fraction, steps, drag)
+    return state, frames, rows
 
 
 @contextmanager

@@ -85,9 +85,12 @@ class Closure(ABC):
     series: ClassVar[Mapping[str, Column]] = {}
     """What `statistics` measures."""
 
+    step: float | None = None
+    """Step [tau] that it is made for; None where any will do."""
+
     @abstractmethod
     def __call__(self, state: State) -> Drag:
-        """Return the drag on all particles."""
+        """Return the drag on all particles. Called once for each step, one after the other."""
 
     def statistics(self, state: State, drag: Drag) -> dict[str, float]:
         """Return averages over particles and counts, after the call for this state."""
@@ -102,14 +105,27 @@ class Closure(ABC):
         return {}
 
     def remember(self, memory: Mapping[str, np.ndarray]) -> None:
-        """Go on from what `memory` returned. Raises ValueError for another closure's memory."""
+        """Go on from what `memory` returned, or start anew from nothing.
+
+        Raises ValueError for another closure's memory.
+        """
         if memory:
             raise ValueError(f"{self.name} remembers nothing, but is given {', '.join(memory)}")
 
 
 def step(state: State, closure: Closure, size: float, stokes_number: float) -> State:
-    """Take one step of `size` [tau]; stokes_number is v_s tau / d_p."""
+    """Take one step of `size` [tau]; stokes_number is v_s tau / d_p.
+
+    Raises ValueError for a closure that is made for another step.
+    """
+    check_step(closure, size)
     return move(state, closure(state), size, stokes_number)
+
+
+def check_step(closure: Closure, size: float) -> None:
+    """Raise ValueError unless the closure is made for steps of `size` [tau]."""
+    if closure.step not in (None, size):
+        raise ValueError(f"{closure.name} is made for a step of {closure.step} tau, not {size}")
 
 
 def move(state: State, drag: Drag, size: float, stokes_number: float) -> State:

@@ -146,7 +146,7 @@ def write_trajectory(path: Path, frames: Records, box_length: float, attributes:
         meaning = {
             "coordinates": ("d_p", "unwrapped positions, z upwards"),
             "velocities": ("v_s", "velocities, z upwards"),
-            "drag_coefficient": ("1", "beta = F'_y / 24, drag over that of an isolated sphere"),
+            "drag_coefficient": ("1", "drag against the motion over that of an isolated sphere"),
         }
         columns = {}
         for name, (units, words) in meaning.items():

@@ -8,6 +8,7 @@ import numpy as np
 import scipy.fft
 from numba import njit
 
+from dustfall.spheres import checked_positions
 from dustfall.suspension.rotne_prager import pair_coefficients
 from dustfall.suspension.splitting import Splitting, choose_splitting
 from dustfall.suspension.window import fold, unfold, window_kernels, window_polynomials
@@ -36,7 +37,7 @@ class PeriodicMobility:
     ----------
     positions : (n, 3) in d_p, n >= 1, wrapped or not; spheres may overlap
     side : of the cube, d_p
-    tolerance : error of the velocities over the forces, root mean square, 1e-10 to 0.1; from 1e-5
+    tolerance : error of the velocities over the forces, root mean square, 1e-8 to 0.1; from 1e-5
         on the product is in single precision
     threads : that share the work; their number changes no bit of a result
     splitting : as from `choose_splitting`, by default the cheapest that keeps the tolerance
@@ -67,12 +68,7 @@ class PeriodicMobility:
         threads: int = 1,
         splitting: Splitting | None = None,
     ):
-        positions = np.asarray(positions, dtype=np.float64)
-        if positions.ndim != 2 or positions.shape[1] != 3 or len(positions) == 0:
-            raise ValueError(f"positions have shape {positions.shape}: (n, 3), n >= 1, is needed")
-        if not np.isfinite(positions).all():
-            row = np.flatnonzero(~np.isfinite(positions).all(axis=1))[0]
-            raise ValueError(f"position of sphere {row} is {positions[row]}: it has to be finite")
+        positions = checked_positions(positions)
         side = float(side)
         if not (np.isfinite(side) and side > 0):
             raise ValueError(f"side of the cube is {side}: it has to be positive and finite")
@@ -231,7 +227,8 @@ class PeriodicMobility:
 def wrapped(positions: np.ndarray, side: float) -> np.ndarray:
     """Positions (n, 3) folded into the cube, 0 <= x < side."""
     inside = positions - side * np.floor(positions / side)
-    inside[inside >= side] = 0.0  # a tiny negative coordinate rounds onto the far face
+    # Rounding puts a coordinate just below a multiple of the side outside the cube.
+    inside[(inside < 0.0) | (inside >= side)] = 0.0
     return inside
 
 

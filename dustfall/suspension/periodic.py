@@ -3,6 +3,7 @@
 import numpy as np
 from scipy.special import erfc
 
+from dustfall.spheres import checked_positions
 from dustfall.suspension.rotne_prager import pair_coefficients
 from dustfall.units import CONTACT, RADIUS
 
@@ -33,9 +34,7 @@ def periodic_mobility(positions, side: float, tolerance=1e-5, splitting=None) ->
     ------
     ValueError : positions of another shape, or two centres closer than `CLOSEST`.
     """
-    positions = np.asarray(positions, dtype=float)
-    if positions.ndim != 2 or positions.shape[1] != 3:
-        raise ValueError(f"positions have shape {positions.shape}: (n, 3) is needed")
+    positions = checked_positions(positions)
     n = len(positions)
     reach = np.sqrt(-np.log(tolerance)) + 0.5
     # The real sum needs the nearest image alone when its terms have died out at half the side.

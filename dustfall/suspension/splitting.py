@@ -55,7 +55,7 @@ WAVES = 12
 SINGLE_PRECISION = 1e-5
 """Tolerance from which on single precision is enough: its rounding makes errors of 1e-6."""
 
-SMALLEST_TOLERANCE, LARGEST_TOLERANCE = 1e-10, 0.1
+SMALLEST_TOLERANCE, LARGEST_TOLERANCE = 1e-8, 0.1
 
 STEEPNESS, STEEPNESS_STEP = (2.0, 66.0), 0.125
 """Range of the search for a window, and how finely it ends."""

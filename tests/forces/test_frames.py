@@ -144,6 +144,7 @@ def test_lateral_force_goes_to_the_canonical_frame_and_back():
         (np.ones((2, 51, 3)), r"shape \(2, 51, 3\).*k from 1 to 50"),
         (np.full((2, 5, 3), np.nan), "scene 0 .* not finite"),
         (np.full((2, 5, 3), np.inf), "not finite"),
+        (np.full((2, 5, 3), 1e160), "beyond 1e"),
         (np.zeros((1, 5, 3)), "centre of the reference sphere"),
     ],
 )

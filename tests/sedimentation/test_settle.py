@@ -390,6 +390,16 @@ def test_run_with_a_damaged_checkpoint_goes_on_to_the_same_bits(
     assert_same_files(tmp_path, undisturbed)
 
 
+@pytest.mark.parametrize("lost", ["frames.bin", "series.bin"])
+def test_run_whose_records_are_lost_begins_anew(tmp_path, undisturbed, lost):
+    checkpoint = tmp_path / "checkpoint"
+    with pytest.raises(Interruption):
+        run(tmp_path, checkpoint=checkpoint, checkpoint_interval=0.0, progress=interrupt_at(11))
+    (checkpoint / lost).unlink()
+    run(tmp_path, checkpoint=checkpoint)
+    assert_same_files(tmp_path, undisturbed)
+
+
 def test_terminated_run_saves_its_state_and_goes_on_to_the_same_bits(tmp_path, undisturbed):
     checkpoint = tmp_path / "checkpoint"
 

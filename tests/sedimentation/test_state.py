@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dustfall.sedimentation import Drag, State, move
+from dustfall.sedimentation import Closure, Drag, State, move, step
 
 RNG = np.random.default_rng(7)
 
@@ -37,3 +37,16 @@ def test_a_constant_force_over_the_step_is_the_implicit_midpoint_rule():
     mean = (velocity + after.velocity) / 2
     np.testing.assert_allclose(after.position, position + 9.0 * 0.3 * mean, atol=1e-13)
     assert after.steps == 1
+
+
+def test_a_closure_made_for_another_step_is_refused():
+    class Yearly(Closure):
+        name, step = "yearly", 365.0
+
+        def __call__(self, state):
+            return Drag(np.ones(1), np.zeros((1, 3)))
+
+    state = State(np.zeros((1, 3)), np.zeros((1, 3)), 1e-3)
+    with pytest.raises(ValueError, match=r"yearly is made for a step of 365\.0 tau, not 0\.1"):
+        step(state, Yearly(), 0.1, 9.0)
+    assert step(state, Yearly(), 365.0, 9.0).steps == 1

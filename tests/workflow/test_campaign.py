@@ -26,7 +26,7 @@ def test_a_second_run_has_nothing_to_do(campaign):
     assert campaign.plan(*SMOKE, "--", "all") == {}
 
 
-def test_bits_of_the_data_hang_neither_on_cores_nor_on_shard_size(campaign, tmp_path):
+def test_bits_of_the_data_depend_neither_on_cores_nor_on_shard_size(campaign, tmp_path):
     campaign.run(
         *SMOKE, "--cores", "1", "--directory", str(tmp_path), "--config",
         "scenes={shard_size: 17}", "--", "results/dataset/forces.h5",

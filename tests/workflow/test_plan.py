@@ -124,10 +124,15 @@ def test_further_seeds_leave_the_names_of_the_first_as_they_are():
 
 
 def test_each_number_of_particles_has_its_number_of_seeds_the_last_for_all_that_follow():
-    settle = {"particles": [10, 20, 30], "seeds": [3, 2], "galileo": {"particles": 500}}
+    settle = {
+        "particles": [15, 20, 30],
+        "seeds": [3, 2],
+        "galileo": {"particles": 500},
+        "all_particles": {"particles": []},
+    }
     cases = plan.cases(configure({"sedimentation": settle})).values()
-    seeds = {n: max(case.seed for case in cases if case.particles == n) for n in (10, 20, 30, 500)}
-    assert seeds == {10: 3, 20: 2, 30: 2, 500: 1}
+    seeds = {n: max(case.seed for case in cases if case.particles == n) for n in (15, 20, 30, 500)}
+    assert seeds == {15: 3, 20: 2, 30: 2, 500: 1}
 
 
 def test_start_file_may_be_one_for_each_case():
@@ -136,10 +141,16 @@ def test_start_file_may_be_one_for_each_case():
     assert plan.start_file(configure({}), "n6_phi1e-03_ga1") == []
 
 
-def test_studies_are_no_part_of_all_and_take_one_run_a_step(project):
+def test_studies_are_no_part_of_all_and_take_one_run_a_setting(project):
     jobs = project.plan("--config", "sedimentation={model: rotne_prager}", "--", "studies")
     jobs.pop("studies", None)
-    assert jobs == {"study_of_a_step": 6, "step_size": 1}
+    assert jobs == {
+        "study_of_a_step": 6,
+        "step_size": 1,
+        # 6 numbers of neighbours at 3 volume fractions
+        "study_of_neighbours": 6 * 3,
+        "neighbour_numbers": 1,
+    }
 
 
 def test_trial_names_are_file_names_and_lead_back_to_their_layers():

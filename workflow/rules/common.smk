@@ -46,9 +46,9 @@ MESHES = expand(
 )
 CASES = plan.cases(config)
 
-# The cases among nearest neighbours; those of `sedimentation.model` at the Galileo number of the properties; those of them with most
-# particles, from dilute to dense and from one start each; and the cases that differ in the Galileo
-# number alone.
+# The cases among nearest neighbours; those of `sedimentation.model` at the Galileo number of the
+# properties; those of them with most particles, from dilute to dense and from one start each; and
+# the cases that differ in the Galileo number alone.
 NEIGHBOUR_CASES = [name for name, case in CASES.items() if case.compared != plan.ALL_PARTICLES]
 PLAIN_CASES = [
     name for name, case in CASES.items() if case.galileo_multiple == 1 and not case.compared

@@ -50,3 +50,58 @@ rule step_size:
         together=config["studies"]["together"],
     script:
         "../scripts/step_size.py"
+
+
+rule study_of_neighbours:
+    """Let a small cloud settle with another number of neighbours, by the Rotne-Prager inverse."""
+    input:
+        model=[],
+        start=[],
+    output:
+        trajectory=temp("results/studies/{case}_phi{phi}.nc"),
+        series="results/studies/{case}_phi{phi}.series.nc",
+    log:
+        "logs/studies/{case}_phi{phi}.log",
+    wildcard_constraints:
+        case=r"neighbours\d+",
+        phi=r"[\d.e-]+",
+    resources:
+        checkpoint_interval=config["sedimentation"]["checkpoint_interval"],
+    params:
+        library=settling_library("rotne_prager"),
+        # The same start for each number.
+        seed=config["seed"],
+        stream=lambda wc: plan.start_stream(f"neighbours_phi{wc.phi}"),
+        model="rotne_prager",
+        neighbours=lambda wc: int(wc.case.removeprefix("neighbours")),
+        particles=min(config["sedimentation"]["particles"]),
+        volume_fraction=lambda wc: float(wc.phi),
+        galileo_multiple=1.0,
+        change=config["sedimentation"]["galileo"]["change"],
+        properties=config["sedimentation"]["properties"],
+        start=config["sedimentation"]["start"],
+        step=config["sedimentation"]["step"],
+        duration=config["sedimentation"]["duration"],
+        save_every=config["sedimentation"]["duration"],
+        precision=config["sedimentation"]["precision"],
+    script:
+        "../scripts/settle.py"
+
+
+rule neighbour_numbers:
+    """Settling velocity against the number of neighbours, the paper's points beside it."""
+    input:
+        series=expand(
+            "results/studies/neighbours{number}_phi{phi:.15g}.series.nc",
+            number=config["studies"]["neighbours"],
+            phi=config["studies"]["neighbours_at"],
+        ),
+    output:
+        "results/studies/neighbour_numbers.csv",
+    log:
+        "logs/studies/neighbour_numbers.log",
+    params:
+        library=library("neighbour_numbers.py"),
+        statistics_from=config["sedimentation"]["statistics_from"],
+    script:
+        "../scripts/neighbour_numbers.py"

@@ -23,7 +23,7 @@ rule sweep:
 
 
 rule winner:
-    """Compare the configurations and choose one a component."""
+    """Compare the configurations and choose the one that both components take."""
     input:
         results=expand("results/sweep/{trial}.json", trial=TRIALS),
     output:

@@ -7,7 +7,7 @@ FURTHER = [
     "results/benchmarks/spheres.csv",
     "results/benchmarks/stress.csv",
     "results/figures/accuracy_vs_cost.csv",
-    "results/studies/hypotheses.csv",
+    "results/studies/neighbour_numbers.csv",
     "results/studies/step_size.csv",
 ]
 

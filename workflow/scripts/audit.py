@@ -15,6 +15,8 @@ from dustfall.scenes import SCENE_COLUMNS
 progress, params = joblog.start(snakemake.log[0]), snakemake.params
 other = "multipole" if params.method == "elements" else "elements"
 tolerance = max(params.tolerance, TOLERANCE)
+# No method audits itself.
+paper = 0 if params.method == "paper" else params.paper
 
 found: dict[str, list] = {}
 for scenes, solutions in zip(snakemake.input.scenes, snakemake.input.solutions, strict=True):
@@ -29,7 +31,7 @@ for k, (law, shards) in enumerate(found.items()):
         for parts in zip(*shards, strict=True)
     )
     # The laws share the sample; the first of them take what is left over.
-    for methods, number in (([other], params.number), (["paper"], params.paper)):
+    for methods, number in (([other], params.number), (["paper"], paper)):
         share = number // len(found) + (k < number % len(found))
         drawn = audit_sample(law, scenes["volume_fraction"], share, params.seed)
         if len(drawn):

@@ -12,7 +12,7 @@ from dustfall.figures.scene import scene_meshes
 from dustfall.figures.style import save
 from dustfall.scenes import SCENE_COLUMNS
 from dustfall.stokes.elements.mesh_files import element_table
-from dustfall.stokes.elements.scene import fixed_spheres_on_meshes
+from dustfall.stokes.elements.scene import NARROWEST_GAP, fixed_spheres_on_meshes
 from dustfall.units import CONTACT
 
 joblog.start(snakemake.log[0])
@@ -31,7 +31,10 @@ def meshed(scene, spheres):
 
 
 # The fifth neighbour is far away in every scene, so the fourth says how compact it is.
-compact, nearest = np.argmin(distance[:, -2]), np.argmin(distance[:, 0])
+compact = np.argmin(distance[:, -2])
+# A narrower gap is not meshed.
+meshable = distance[:, 0] >= CONTACT + NARROWEST_GAP
+nearest = np.argmin(np.where(meshable, distance[:, 0], np.inf))
 pair = meshed(nearest, 2)
 gap = f"gap {distance[nearest, 0] - CONTACT:.2g} $d_p$"
 panels = [

@@ -7,5 +7,6 @@ from settling import properties_of, settle_case
 
 learned = snakemake.input.model
 model = load_model(learned) if learned else load_formula(snakemake.params.model)
-closure = NearestNeighbours(model, threads=snakemake.threads)
+number = snakemake.params.get("neighbours")
+closure = NearestNeighbours(model, number, threads=snakemake.threads)
 settle_case(snakemake, closure, properties_of(snakemake.params))

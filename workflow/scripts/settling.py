@@ -14,7 +14,7 @@ from dustfall.sedimentation.state import Closure
 def settle_case(snakemake, closure: Closure, properties: Properties) -> None:
     """Let a case settle from its start, or go on where it was killed."""
     progress = joblog.start(snakemake.log[0])
-    params, case = snakemake.params, snakemake.wildcards.case
+    params, case = snakemake.params, Path(snakemake.output.trajectory).stem
     if snakemake.input.start:
         position, velocity = read_start(
             snakemake.input.start, params.particles, params.volume_fraction
@@ -53,7 +53,7 @@ def _checkpoint(snakemake) -> Path:
     state = hashlib.sha256(repr(sorted(snakemake.params.items())).encode())
     for file in (snakemake.input.get("model"), snakemake.input.start):
         state.update(Path(file).read_bytes() if file else b"none")
-    case = snakemake.wildcards.case
+    case = Path(snakemake.output.trajectory).stem
     folder = Path(snakemake.output.trajectory).parent / "checkpoints"
     for other in folder.glob(f"{case}-*"):
         if other.name != f"{case}-{state.hexdigest()[:16]}":

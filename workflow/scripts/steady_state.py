@@ -14,6 +14,8 @@ quantities = [
     "inverse_beta_mean",
     "drag_mean",
     "new_neighbours",
+    "box_reynolds",
+    "memory_from",
 ]
 runs = [xr.load_dataset(path) for path in snakemake.input.series]
 table = steady_state(runs, snakemake.params.statistics_from, quantities)

@@ -80,6 +80,7 @@ class AllParticles(Closure):
     """
 
     name = "all_particles"
+    step: float
     series: ClassVar = {
         "products": Column("1", "products with the mobility that the step took"),
         "stopped": Column("1", "pairs stopped because they would touch"),
@@ -231,9 +232,9 @@ class AllParticles(Closure):
 
     def remember(self, memory: Mapping[str, np.ndarray]) -> None:
         """Go on from what `memory` returned. Raises ValueError for a run in another fluid."""
-        if ("waves" in memory) != (self.fluid == "unsteady"):
+        if memory and ("waves" in memory) != (self.fluid == "unsteady"):
             raise ValueError(f"the memory of a run is not that of a fluid that is {self.fluid}")
-        self._force = memory["force"]
+        self._force = memory.get("force")
         self._force_before = memory.get("force_before")
         self._waves = memory.get("waves")
         self._splitting = None

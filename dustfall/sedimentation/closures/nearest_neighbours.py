@@ -21,8 +21,8 @@ UP = np.array([0.0, 0.0, 1.0])
 PROBES = 64
 """Random scenes on which two force models are told apart."""
 
-PROBED_DISTANCES = (0.1, 2.5)
-"""Their distances, as powers of ten [d_p]: from near contact to a dilute cloud."""
+PROBED_DISTANCES = (0.0, 2.5)
+"""Their distances, as powers of ten [d_p]: from contact to a dilute cloud."""
 
 
 class NearestNeighbours(Closure):
@@ -57,11 +57,11 @@ class NearestNeighbours(Closure):
     def __init__(self, model, neighbours: int | None = None, threads: int = 1):
         own = getattr(model, "neighbours", None)
         default = NEIGHBOURS if own is None else own
-        self.neighbours = default if neighbours is None else neighbours
+        self.neighbours = int(default if neighbours is None else neighbours)
         if not 1 <= self.neighbours <= MOST_NEIGHBOURS:
-            raise ValueError(f"{neighbours} neighbours: allowed are 1 to {MOST_NEIGHBOURS}")
+            raise ValueError(f"{self.neighbours} neighbours: allowed are 1 to {MOST_NEIGHBOURS}")
         if own not in (None, self.neighbours):
-            raise ValueError(f"{neighbours} neighbours: the model takes {own}")
+            raise ValueError(f"{self.neighbours} neighbours: the model takes {own}")
         self.model = model
         self.threads = threads
         self._nearest: NeighbourList | None = None
@@ -71,6 +71,11 @@ class NearestNeighbours(Closure):
 
     def __call__(self, state: State) -> Drag:
         """Return the drag of the moment. Raises FloatingPointError for a force not finite."""
+        listed = self._nearest
+        if listed is not None and (
+            listed.box_length != state.box_length or len(listed.index) != len(state.position)
+        ):
+            self.remember({})  # another cloud
         if self._nearest is None:
             self._blocks = Blocks(len(state.position), self.threads)
             self._nearest = NeighbourList(
@@ -133,11 +138,13 @@ class NearestNeighbours(Closure):
 
     def memory(self) -> dict[str, np.ndarray]:
         """Return the neighbours of the last step, and the order in which particles lie."""
+        if self._nearest is None:
+            return {}
         return {"index": self._list.index, "order": self._list.order}
 
     def remember(self, memory: Mapping[str, np.ndarray]) -> None:
         """Go on from what `memory` returned."""
-        self._index, self._order = memory["index"], memory["order"]
+        self._index, self._order = memory.get("index"), memory.get("order")
         self._nearest = None
 
 

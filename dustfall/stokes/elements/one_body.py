@@ -10,11 +10,9 @@ all orientations of the mesh.
 
 from dataclasses import dataclass
 
-import h5py
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from dustfall.files import atomic
 from dustfall.stokes.elements.mesh import SphereMesh
 from dustfall.stokes.elements.single_layer import nodal_integrals, self_interaction
 from dustfall.stokes.harmonics import axes_swapped, real_harmonics, total_momentum_projectors
@@ -59,25 +57,6 @@ class OneBody:
     def drag(self) -> float:
         """Force along a unit flow on a lone sphere [mu U d_p], exactly 3 pi on a perfect mesh."""
         return 4.0 * np.pi * RADIUS * float(self.response[0, 2])
-
-    def save(self, path) -> None:
-        """Write the mesh and its operator to an HDF5 file."""
-        with atomic(path) as temporary, h5py.File(temporary, "w") as file:
-            file.attrs["content"] = (
-                "one-body operator; mu = 1. factor: of the single-layer matrix, lengths in d_p; "
-                "response: by degree and total momentum, lengths in radii"
-            )
-            file["vertices"] = self.mesh.vertices
-            file["triangles"] = self.mesh.triangles
-            file["factor"] = self.factor
-            file["response"] = self.response
-
-    @classmethod
-    def load(cls, path) -> "OneBody":
-        """Read what `save` wrote."""
-        with h5py.File(path) as file:
-            mesh = SphereMesh(file["vertices"][:], file["triangles"][:])
-            return cls(mesh, file["factor"][:], file["response"][:])
 
 
 def _rotational_average(answer) -> np.ndarray:

@@ -6,6 +6,7 @@ from dustfall.forces.learned import load_model
 from dustfall.sedimentation import NearestNeighbours, nearest_neighbours, random_start
 from dustfall.sedimentation.closures.nearest_neighbours import drag_coefficients
 from dustfall.suspension.rotne_prager import rotne_prager_forces
+from tests.sedimentation.runs import run
 
 RNG = np.random.default_rng(7)
 
@@ -85,3 +86,18 @@ def test_the_number_of_neighbours_is_the_models_own():
     for number in (0, 51):
         with pytest.raises(ValueError, match="allowed are 1 to 50"):
             NearestNeighbours(ROTNE_PRAGER, number)
+
+
+def test_a_closure_that_has_seen_another_cloud_starts_anew():
+    closure = NearestNeighbours(ROTNE_PRAGER)
+    closure(random_start(60, 1e-3, seed=1))
+    for state in (random_start(60, 1e-5, seed=2), random_start(90, 1e-3, seed=3)):
+        again, fresh = closure(state), NearestNeighbours(ROTNE_PRAGER)(state)
+        np.testing.assert_array_equal(again.beta, fresh.beta)
+
+
+def test_two_runs_of_one_closure_have_the_bits_of_two_closures(tmp_path):
+    closure = NearestNeighbours(ROTNE_PRAGER)
+    first, _ = run(tmp_path, closure=closure)
+    second, _ = run(tmp_path, closure=closure)
+    assert first.identical(second)

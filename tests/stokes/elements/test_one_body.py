@@ -41,12 +41,3 @@ def test_drag_converges_to_stokes_drag(bodies):
     assert errors[1] < 1e-7
     assert errors[2] < 1e-8
     assert len(bodies[2].mesh.triangles) <= 320
-
-
-def test_saved_operator_comes_back_bit_for_bit(bodies, tmp_path):
-    body = bodies[0]
-    body.save(tmp_path / "body.h5")
-    again = OneBody.load(tmp_path / "body.h5")
-    for name in ("factor", "response"):
-        np.testing.assert_array_equal(getattr(again, name), getattr(body, name))
-    np.testing.assert_array_equal(again.mesh.triangles, body.mesh.triangles)
