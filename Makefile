@@ -16,7 +16,7 @@ run: environment
 	$(VENV)/bin/snakemake --configfile $(CONFIG) -- all
 
 test: environment
-	$(VENV)/bin/python -m pytest -n auto --dist loadfile -m "not openfoam"
+	$(VENV)/bin/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m "not openfoam"
 
 openfoam:
 	openfoam/build.sh
