@@ -33,8 +33,9 @@ def test_config_yaml_spells_out_every_default():
     assert configure(written) == configure({})
 
 
-def test_smoke_yaml_is_valid():
-    configure(yaml.safe_load((ROOT / "config/smoke.yaml").read_text()))
+@pytest.mark.parametrize("name", ["smoke", "shorter"])
+def test_other_campaigns_are_valid(name):
+    configure(yaml.safe_load((ROOT / f"config/{name}.yaml").read_text()))
 
 
 def test_readme_tabulates_the_schema():
