@@ -231,7 +231,10 @@ class AllParticles(Closure):
         return {name: array for name, array in kept.items() if array is not None}
 
     def remember(self, memory: Mapping[str, np.ndarray]) -> None:
-        """Go on from what `memory` returned. Raises ValueError for a run in another fluid."""
+        """Go on from what `memory` returned, or start anew from nothing.
+
+        Raises ValueError for a run in another fluid.
+        """
         if memory and ("waves" in memory) != (self.fluid == "unsteady"):
             raise ValueError(f"the memory of a run is not that of a fluid that is {self.fluid}")
         self._force = memory.get("force")

@@ -143,7 +143,7 @@ class NearestNeighbours(Closure):
         return {"index": self._list.index, "order": self._list.order}
 
     def remember(self, memory: Mapping[str, np.ndarray]) -> None:
-        """Go on from what `memory` returned."""
+        """Go on from what `memory` returned, or start anew from nothing."""
         self._index, self._order = memory.get("index"), memory.get("order")
         self._nearest = None
 

@@ -1,11 +1,11 @@
 """The one-body operator: how a lone fixed sphere answers any incoming flow.
 
-Every sphere is the same body, so its single-layer matrix is assembled and factored once for a
-template mesh and serves every sphere of every scene. Seen by others a sphere is described by few
-numbers: the incoming velocity enters through its surface harmonics u_lm, the traction leaves
-through its moments q_lm = integral of f Y_lm dS. The answer of a sphere commutes with rotations,
-so on each degree and total momentum (`harmonics`) it is a number: the mesh's answer, averaged over
-all orientations of the mesh.
+Every sphere is the same body: the single-layer matrix of a template mesh is assembled and factored
+once, and the stress tests hold its answer against that of the same mesh turned. Seen by others a
+sphere is described by few numbers: the incoming velocity enters through its surface harmonics
+u_lm, the traction leaves through its moments q_lm = integral of f Y_lm dS. The answer of a sphere
+commutes with rotations, so on each degree and total momentum (`harmonics`) it is a number: the
+mesh's answer, averaged over all orientations of the mesh.
 """
 
 from dataclasses import dataclass
