@@ -9,7 +9,7 @@ import sys
 from snakemake.utils import min_version
 
 from dustfall.forces.registry import trained_models
-from workflow import plan
+from workflow import plan, stops
 from workflow.configuration import ConfigurationError, configure
 from workflow.library import ROOT, digest, library_files
 
@@ -103,9 +103,21 @@ rule configuration:
         "workflow/scripts/configuration.py"
 
 
+rule verify:
+    """Compare every file in results/ with the checksum that its job wrote."""
+    localrule: True
+    script:
+        "workflow/scripts/verify.py"
+
+
+onstart:
+    stops.clear()
+
+
 onsuccess:
+    stops.clear()
     print("Done: see results/, and `snakemake --report report.html` for an overview.")
 
 
 onerror:
-    print("Stopped: the job that failed and its log are shown above; logs/ keeps the logs.")
+    stops.announce(log)

@@ -68,7 +68,12 @@ def read_columns(path: str | PathLike, names: Iterable[str]) -> dict[str, np.nda
     return found
 
 
+def started_checksum(dtype: np.dtype, shape: tuple[int, ...]):
+    """SHA-256 of an array whose bytes are still to come, be it part by part."""
+    return hashlib.sha256(f"{dtype.str} {shape}".encode())
+
+
 def _checksum(array: np.ndarray) -> str:
-    digest = hashlib.sha256(f"{array.dtype.str} {array.shape}".encode())
+    digest = started_checksum(array.dtype, array.shape)
     digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()

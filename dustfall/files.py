@@ -1,10 +1,14 @@
 """Files that are either whole or absent."""
 
+import errno
 import os
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+LEAST_ROOM = 2**20
+"""Bytes that a disk has which is not full."""
 
 
 @contextmanager
@@ -12,7 +16,8 @@ def atomic(path: str | os.PathLike) -> Iterator[Path]:
     """Yield a temporary path beside `path`; move it into place when the block ends well.
 
     The temporary file has the suffix of `path`, because some writers choose the format by it.
-    When the block raises, the temporary file is removed and `path` stays as it was.
+    When the block raises, the temporary file is removed and `path` stays as it was. Raises OSError
+    with the errno ENOSPC where the disk is full, whatever the writer made of that.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -26,8 +31,24 @@ def atomic(path: str | os.PathLike) -> Iterator[Path]:
         os.umask(umask)
         temporary.chmod(0o666 & ~umask)
         os.replace(temporary, path)
+    except (OSError, RuntimeError) as error:
+        # Libraries hide the system's word: NetCDF says "HDF error".
+        if _is_full(temporary):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path)) from error
+        raise
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _is_full(path: Path) -> bool:
+    """Whether the disk has no room for a file like `path`, as far as it was written, again."""
+    try:
+        with open(path, "r+b") as file:
+            size = os.fstat(file.fileno()).st_size
+            os.posix_fallocate(file.fileno(), size, max(size, LEAST_ROOM))
+    except OSError as error:
+        return error.errno in (errno.ENOSPC, errno.EDQUOT)
+    return False
 
 
 def remove_leftovers(path: str | os.PathLike) -> None:

@@ -14,6 +14,9 @@ not zero: their squares are numbers still."""
 
 def checked_numbers(name: str, values) -> np.ndarray:
     """An own array of floats; ValueError for words, holes and rows of different lengths."""
+    if np.ma.is_masked(values):
+        hole = np.argwhere(np.ma.getmaskarray(values))[0].tolist()
+        raise ValueError(f"{name} must be an array of numbers: the value at {hole} is missing")
     try:
         return np.array(values, dtype=float)
     except (TypeError, ValueError, OverflowError) as error:

@@ -6,7 +6,7 @@ The flow frame has x spanwise, y streamwise (the flow runs along +y) and z verti
 import numpy as np
 from numba import njit
 
-from dustfall.spheres import LARGEST
+from dustfall.spheres import LARGEST, checked_numbers
 from dustfall.units import CONTACT
 
 MOST_NEIGHBOURS = 50
@@ -90,7 +90,7 @@ def check_neighbours(neighbours, number: int | None = None) -> np.ndarray:
     A wrong shape, another `number` k than the given one, a value that is not finite or beyond
     LARGEST and a neighbour at the centre of the reference sphere (it has no direction) are refused.
     """
-    neighbours = np.ascontiguousarray(neighbours, dtype=float)
+    neighbours = np.ascontiguousarray(checked_numbers("neighbours", neighbours))
     allowed = range(1, MOST_NEIGHBOURS + 1) if number is None else (number,)
     if neighbours.ndim != 3 or neighbours.shape[2] != 3 or neighbours.shape[1] not in allowed:
         expected = f"k from 1 to {MOST_NEIGHBOURS}" if number is None else f"k = {number}"

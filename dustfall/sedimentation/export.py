@@ -4,10 +4,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import h5py
-import netCDF4
 import numpy as np
 
 from dustfall.files import atomic
+from dustfall.sedimentation.trajectory import open_run
 
 VERSION = (2, 0)
 """Of the VTKHDF format: the first with polygonal data that change in time (ParaView 5.12)."""
@@ -39,9 +39,10 @@ def export_vtkhdf(
 
     Raises
     ------
-    ValueError : the file lacks a variable of a trajectory, or has no frame.
+    FileNotFoundError : there is no trajectory.
+    ValueError : the file is damaged, lacks a variable of a trajectory, or has no frame.
     """
-    with netCDF4.Dataset(trajectory) as source:
+    with open_run(trajectory) as source:
         for name in ("time", "coordinates", "cell_lengths"):
             if name not in source.variables:
                 raise ValueError(f"{trajectory} has no variable {name!r}: it is no trajectory")

@@ -94,7 +94,7 @@ class NeighbourList:
         self._wrapped = wrap(position, self.box_length)
         if self._before is not None:
             _add_way(self._way, position, self._before, self.box_length)
-        self._before = position.copy()
+        self._before = position
         cells = sort_by_cell(self._wrapped, self.box_length)
         if self._updates % REORDERED_EVERY == 0 or not self.order.size:
             self.order = cells[1]

@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from dustfall.sedimentation.blocks import Blocks
+from dustfall.spheres import checked_numbers
 from dustfall.units import NEIGHBOURS
 
 EXPECTED_WITHIN = 2.8
@@ -15,6 +16,13 @@ EXPECTED_WITHIN = 2.8
 
 GROWTH = 1.5
 """By what a search is widened that met too few particles."""
+
+FARTHEST = 1e9
+"""Largest magnitude of a coordinate, in sides of the cube: folded back, it is exact to 1e-7 of the
+side."""
+
+SIDES = (1e-100, 1e90)
+"""Smallest and largest side of a cube: squares of all distances are numbers still."""
 
 _ROUNDING = 1e-9  # of a cell: keeps rounding of cell faces from hiding a particle
 
@@ -40,8 +48,8 @@ def nearest_neighbours(
 
     Raises
     ------
-    ValueError : no more than k particles, wrong shape, positions that are not finite, a
-        `box_length` that is not positive.
+    ValueError : no more than k particles, wrong shape, positions that are not finite or beyond
+        `FARTHEST` sides, a `box_length` outside `SIDES`.
     """
     position = check_positions(position, box_length, number)
     n = len(position)
@@ -55,7 +63,7 @@ def nearest_neighbours(
 
 def check_positions(position: np.ndarray, box_length: float, number: int) -> np.ndarray:
     """Return `position` as contiguous float64 (n, 3), or raise ValueError by name."""
-    position = np.ascontiguousarray(position, dtype=np.float64)
+    position = np.ascontiguousarray(checked_numbers("positions", position))
     if position.ndim != 2 or position.shape[1] != 3:
         raise ValueError(f"positions have shape {position.shape}: (n, 3) is needed")
     if len(position) <= number:
@@ -63,11 +71,18 @@ def check_positions(position: np.ndarray, box_length: float, number: int) -> np.
             f"{len(position)} particles: at least {number + 1} are needed for each to have "
             f"{number} neighbours"
         )
-    if not (np.isfinite(box_length) and box_length > 0):
-        raise ValueError(f"box_length is {box_length}: it has to be positive and finite")
-    if not np.isfinite(position).all():
-        row = np.flatnonzero(~np.isfinite(position).all(axis=1))[0]
-        raise ValueError(f"position of particle {row} is {position[row]}: it has to be finite")
+    if not SIDES[0] <= box_length <= SIDES[1]:
+        raise ValueError(
+            f"box_length is {box_length}: it has to be positive and finite, {SIDES[0]:g} to "
+            f"{SIDES[1]:g}"
+        )
+    allowed = np.abs(position) <= FARTHEST * box_length
+    if not allowed.all():
+        row = np.flatnonzero(~allowed.all(axis=1))[0]
+        raise ValueError(
+            f"position of particle {row} is {position[row]}: it has to be finite, within "
+            f"{FARTHEST:g} sides of the cube"
+        )
     return position
 
 

@@ -1,7 +1,15 @@
 """Physical properties of a settling suspension, and the scales that they set."""
 
+import warnings
 from dataclasses import dataclass, fields, replace
 from math import isfinite
+
+MOST_GALILEO = 1.0
+"""Largest Galileo number that is settled with Stokes drag. It is the Reynolds number that Stokes'
+law gives a lone sphere, and inertia of the fluid adds 3/16 of that to its drag (Oseen): 19 %."""
+
+DOUBTFUL_GALILEO = 0.5
+"""Where it exceeds this, 9 % by Oseen, a warning says so."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +69,25 @@ class Properties:
     def stokes_number(self) -> float:
         """v_s tau / d: the diameters that an isolated sphere settles in one response time."""
         return self.settling_velocity * self.response_time / self.diameter
+
+    def check_stokes_flow(self) -> None:
+        """Raise ValueError where the flow around a sphere is no Stokes flow; warn where it may be.
+
+        Limits: `MOST_GALILEO` and `DOUBTFUL_GALILEO`.
+        """
+        si = ", ".join(f"{field.name} {getattr(self, field.name):g}" for field in fields(self))
+        found = f"the Galileo number is {self.galileo:.3g} ({si}, in SI units)"
+        if not self.galileo <= MOST_GALILEO:
+            raise ValueError(
+                f"{found}: Stokes drag is allowed up to {MOST_GALILEO:g}, where the inertia of the "
+                "fluid adds 19 % to it"
+            )
+        if self.galileo > DOUBTFUL_GALILEO:
+            warnings.warn(
+                f"{found}: above {DOUBTFUL_GALILEO:g} the inertia of the fluid, which is left out, "
+                f"adds {3 / 16 * self.galileo:.0%} to the drag",
+                stacklevel=2,
+            )
 
     def with_galileo_multiple(self, multiple: float, change: str = "gravity") -> "Properties":
         """The same suspension at `multiple` times its Galileo number, by changing one property.

@@ -16,6 +16,7 @@ from dustfall import __version__
 from dustfall.columns import Column
 from dustfall.files import remove_leftovers
 from dustfall.sedimentation import checkpoint as checkpoints
+from dustfall.sedimentation.neighbours import FARTHEST
 from dustfall.sedimentation.properties import Properties
 from dustfall.sedimentation.state import Closure, Drag, State, check_step, move
 from dustfall.sedimentation.trajectory import (
@@ -35,12 +36,16 @@ UNITS = (
     "step, duration, save_interval: tau; galileo, stokes_number (v_s tau / d_p): 1"
 )
 
+MOST_STEPS = 10**9
+"""More steps than any run takes: a million particles take a second for each."""
+
 
 @dataclass(frozen=True)
 class Schedule:
     """When a run ends, and when it is written down; all in tau.
 
-    Raises ValueError for a step that is not positive, or times that are no multiples of it.
+    Raises ValueError for a step that is not positive, or times that are no multiples of it, or of
+    more than MOST_STEPS.
     """
 
     step: float
@@ -52,10 +57,11 @@ class Schedule:
             raise ValueError(f"step is {self.step}: it has to be positive and finite, in tau")
         for name in ("duration", "save_interval"):
             value = getattr(self, name)
-            count = round(value / self.step) if np.isfinite(value) else 0
+            count = round(value / self.step) if value / self.step <= MOST_STEPS else 0
             if count < 1 or abs(value - count * self.step) > 1e-9 * value:
                 raise ValueError(
-                    f"{name} is {value}: it has to be a multiple of the step, {self.step}"
+                    f"{name} is {value}: it has to be a multiple of the step, {self.step}, and of "
+                    f"at most {MOST_STEPS} steps"
                 )
 
     @property
@@ -104,7 +110,7 @@ class Checkpoint:
     """Where the state of an unfinished run is kept, and the wall time between two of them [s].
 
     A run that was killed goes on from there when it is called again, and ends with the same bits;
-    at the end the folder is removed. SIGTERM saves the state and stops.
+    at the end the folder is removed. SIGTERM and Ctrl-C save the state and stop.
     """
 
     folder: Path
@@ -138,12 +144,13 @@ def settle(
 
     Raises
     ------
-    ValueError : the checkpoint is of a run with other settings, or the closure is made for another
-        step.
-    FloatingPointError : the drag is not finite.
-    SystemExit : SIGTERM came, and the state was saved.
+    ValueError : the checkpoint is of a run with other settings, the closure is made for another
+        step, or the flow is no Stokes flow (see `Properties.check_stokes_flow`).
+    FloatingPointError : the drag is not finite, or a particle has flown off.
+    SystemExit : SIGTERM or Ctrl-C came, and the state was saved.
     """
     check_step(closure, schedule.step)
+    properties.check_stokes_flow()
     tracked = output.tracked(len(start.position))
     settings = {
         "dustfall_version": __version__,
@@ -179,6 +186,7 @@ def settle(
             if state.steps == schedule.steps:
                 break
             state = move(state, drag, schedule.step, properties.stokes_number)
+            _check_places(state)
             stop = terminated()
             if checkpoint is not None and (stop or time.monotonic() - saved >= checkpoint.interval):
                 _save(folder, settings, state, closure, frames, rows)
@@ -195,6 +203,17 @@ def settle(
         rows.remove()
     steps = state.steps - first
     return {"steps": steps, "seconds": seconds, "steps_per_second": steps / seconds}
+
+
+def _check_places(state: State) -> None:
+    """Raise FloatingPointError where a particle has flown off, or is nowhere."""
+    there = np.abs(state.position) <= FARTHEST * state.box_length
+    if not there.all():
+        row = np.flatnonzero(~there.all(axis=1))[0]
+        raise FloatingPointError(
+            f"particle {row} is at {state.position[row]} d_p after step {state.steps}: the time "
+            "step or the start does not suit the drag"
+        )
 
 
 def _measured(state: State, drag: Drag, tracked: np.ndarray, closure: Closure) -> dict:
@@ -252,7 +271,9 @@ def _save(folder: Path, settings, state: State, closure: Closure, frames: Record
             "force": drag.force,
             "whole_step": drag.whole_step,
             "frames": frames.count,
+            "frames_digest": frames.digest(),
             "rows": rows.count,
+            "rows_digest": rows.digest(),
             **memory,
         },
     )
@@ -261,10 +282,15 @@ def _save(folder: Path, settings, state: State, closure: Closure, frames: Record
 def _resume(folder: Path, settings: dict, closure: Closure, frame: np.dtype, row: np.dtype):
     """The state to go on from, if any, and the records that belong to it, cut back to it."""
     for saved in checkpoints.load(folder, settings):
-        # Records shorter than a state, or lost, leave the state before it, or a start anew.
+        # Records damaged, cut or lost leave the state before it, or a start anew.
         with suppress(ValueError, FileNotFoundError):
-            frames = Records(folder / "frames.bin", frame, int(saved["frames"]))
-            rows = Records(folder / "series.bin", row, int(saved["rows"]))
+            frames, rows = (
+                Records(folder / file, record, int(saved[name]), str(saved[f"{name}_digest"]))
+                for name, file, record in (
+                    ("frames", "frames.bin", frame),
+                    ("rows", "series.bin", row),
+                )
+            )
             break
     else:
         closure.remember({})
@@ -300,13 +326,17 @@ def _working_folder(checkpoint: Checkpoint | None, output: Output) -> Iterator[P
 
 @contextmanager
 def _terminated() -> Iterator[Callable[[], bool]]:
-    """Yield a function that says whether SIGTERM has come, which would end the process at once."""
+    """Yield a function that says whether SIGTERM or Ctrl-C has come, in place of ending there."""
     came = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         yield came.is_set  # signals reach the main thread only
         return
-    before = signal.signal(signal.SIGTERM, lambda *_: came.set())
+    before = {
+        number: signal.signal(number, lambda *_: came.set())
+        for number in (signal.SIGTERM, signal.SIGINT)
+    }
     try:
         yield came.is_set
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)

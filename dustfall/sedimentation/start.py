@@ -1,14 +1,19 @@
 """Where the particles are when a run starts, and how fast."""
 
+import os
+import warnings
 from pathlib import Path
 
-import netCDF4
 import numpy as np
 from numba import njit
+from scipy.spatial import cKDTree
 
-from dustfall.sedimentation.neighbours import sort_by_cell
+from dustfall.sedimentation.neighbours import FARTHEST, sort_by_cell, wrap
 from dustfall.sedimentation.state import State, box_length
+from dustfall.sedimentation.trajectory import open_run
+from dustfall.spheres import checked_numbers
 from dustfall.streams import Purpose, stream
+from dustfall.units import CONTACT
 
 SATURATION = 0.38
 """Random sequential addition of equal spheres jams near this volume fraction (0.3841)."""
@@ -16,6 +21,19 @@ SATURATION = 0.38
 DRAWS_PER_PARTICLE = 10_000
 """Draws after which a packing is given up; at a volume fraction of 0.3 about a hundred suffice."""
 
+
+FASTEST = 100.0
+"""Largest component of a velocity at the start [v_s]: no cloud's particle settles so fast."""
+
+TOUCH = 1e-5
+"""How much nearer than a diameter two centres may be read to be: positions are stored in single
+precision, or in text of few digits."""
+
+LONGEST_LINE = 1000
+"""Bytes that a line of a table has at most, on average."""
+
+MOST_IN_A_CELL = 8
+"""Centres of spheres that do not overlap find place in a cube of side d_p: one in each corner."""
 
 START_VELOCITY = {"rest": 0.0, "stokes": -1.0}
 """Vertical velocity at the start [v_s]."""
@@ -38,20 +56,29 @@ def random_start(
 def start_from(position, volume_fraction: float, velocity="rest") -> State:
     """Start from given places (n, 3) [d_p] and velocities: (n, 3) [v_s], "rest" or "stokes".
 
-    Raises ValueError for another shape, a value that is not finite, or another word.
+    Raises ValueError for another shape, a value that is missing, not finite or too large, or
+    another word.
     """
-    position = np.array(position, dtype=np.float64)
+    position = checked_numbers("positions", position)
     if isinstance(velocity, str):
         if velocity not in START_VELOCITY:
             raise ValueError(f"start is {velocity!r}: allowed are {', '.join(START_VELOCITY)}")
         velocity = np.tile([0.0, 0.0, START_VELOCITY[velocity]], (len(position), 1))
-    velocity = np.array(velocity, dtype=np.float64)
-    for name, array in {"positions": position, "velocities": velocity}.items():
-        if array.shape != (len(position), 3):
-            raise ValueError(f"{name} have shape {array.shape}: ({len(position)}, 3) is needed")
-        if not np.isfinite(array).all():
-            raise ValueError(f"{name} at the start hold a value that is not finite")
-    box_length(len(position), volume_fraction)
+    velocity = checked_numbers("velocities", velocity)
+    number = len(position) if position.ndim else 0
+    farthest = FARTHEST * box_length(number, volume_fraction)
+    for name, array, most, unit in (
+        ("positions", position, farthest, "d_p"),
+        ("velocities", velocity, FASTEST, "v_s"),
+    ):
+        if array.shape != (number, 3):
+            raise ValueError(f"{name} have shape {array.shape}: ({number}, 3) is needed")
+        bad = np.flatnonzero(~(np.abs(array) <= most).all(axis=1))
+        if len(bad):
+            raise ValueError(
+                f"{name} at the start hold {array[bad[0]].tolist()} for particle {bad[0]}: allowed "
+                f"are finite values of at most {most:.3g} {unit}"
+            )
     return State(position, velocity, volume_fraction)
 
 
@@ -100,7 +127,8 @@ def read_start(path: str | Path, particles: int, volume_fraction: float):
     A trajectory follows the AMBER convention, as those of this package do, with coordinates in d_p
     and, where it has them, velocities in v_s; its cube is the one that `particles` and
     `volume_fraction` give. A table has one particle a line: x y z in d_p, or x y z v_x v_y v_z with
-    velocities in v_s; what follows a # is a comment.
+    velocities in v_s; what follows a # is a comment. Spheres of a table may not overlap; those of a
+    run have moved as its closure said, which may be into each other.
 
     Returns
     -------
@@ -109,42 +137,115 @@ def read_start(path: str | Path, particles: int, volume_fraction: float):
     Raises
     ------
     FileNotFoundError : there is no such file.
-    ValueError : the file holds something else, another number of particles or another cube.
+    ValueError : the file is damaged or holds something else, another number of particles, another
+        cube, values that are missing or too large, spheres that overlap.
     """
-    path = Path(path)
+    path, length = Path(path), box_length(particles, volume_fraction)
+    if path.exists() and not path.is_file():
+        raise ValueError(f"{path} is no file: a trajectory (.nc) or a table of text is needed")
     if path.suffix == ".nc":
-        with netCDF4.Dataset(path) as file:
-            length = box_length(particles, volume_fraction)
-            lengths = _last_frame(path, file, "cell_lengths", "d_p")
-            if lengths is not None and not np.allclose(lengths, length, rtol=1e-6):
-                raise ValueError(
-                    f"{path} has a cell of {lengths} d_p: {particles} particles at volume fraction "
-                    f"phi = {volume_fraction:g} fill a cube of {length:.6g} d_p"
-                )
-            positions = _last_frame(path, file, "coordinates", "d_p")
-            velocities = _last_frame(path, file, "velocities", "v_s")
-        if positions is None:
-            raise ValueError(f"{path} has no variable coordinates")
+        positions, velocities = _last_frames(path, particles, volume_fraction)
     else:
-        table = np.loadtxt(path, ndmin=2)
-        if table.shape[1] not in (3, 6):
-            raise ValueError(f"{path} has {table.shape[1]} columns: 3 or 6 are needed")
+        table = _table(path, particles)
         positions, velocities = table[:, :3], table[:, 3:] if table.shape[1] == 6 else None
     if len(positions) != particles:
         raise ValueError(f"{path} holds {len(positions)} particles: {particles} are needed")
+    try:
+        start_from(positions, volume_fraction, "rest" if velocities is None else velocities)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+    if path.suffix != ".nc":
+        _refuse_overlaps(path, positions, length)
     return positions, velocities
 
 
-def _last_frame(path, file, name, units):
+def _table(path: Path, particles: int) -> np.ndarray:
+    """A table of 3 or 6 columns."""
+    with open(path, "rb") as file:
+        size = file.seek(0, os.SEEK_END)
+    if size > LONGEST_LINE * (particles + 100):
+        raise ValueError(
+            f"{path} has {size} bytes: a table of {particles} particles has at most "
+            f"{LONGEST_LINE} a line"
+        )
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of an empty file
+            table = np.loadtxt(path, ndmin=2, encoding="utf-8")
+    except ValueError as error:
+        words = str(error).split("; use `usecols`")[0]
+        raise ValueError(f"{path} is no table of numbers: {words}") from None
+    if table.size == 0:
+        raise ValueError(f"{path} holds no particle: {particles} are needed")
+    if table.shape[1] not in (3, 6):
+        raise ValueError(
+            f"{path} has {table.shape[1]} columns: 3 or 6 are needed, x y z [v_x v_y v_z]"
+        )
+    return table
+
+
+def _last_frames(path: Path, particles: int, volume_fraction: float):
+    """Positions, and velocities or None, of the last frame of a trajectory in float64."""
+    length = box_length(particles, volume_fraction)
+    with open_run(path) as file:
+        lengths = _last_frame(path, file, "cell_lengths", "d_p", (3,))
+        if lengths is not None and not np.allclose(lengths, length, rtol=1e-6):
+            raise ValueError(
+                f"{path} has a cell of {lengths} d_p: {particles} particles at volume fraction "
+                f"phi = {volume_fraction:g} fill a cube of {length:.6g} d_p"
+            )
+        positions = _last_frame(path, file, "coordinates", "d_p", (particles, 3))
+        velocities = _last_frame(path, file, "velocities", "v_s", (particles, 3))
+    if positions is None:
+        raise ValueError(f"{path} has no variable coordinates")
+    return positions, velocities
+
+
+def _last_frame(path, file, name, units, shape):
     """Last frame of a variable in float64; None where there is no such variable."""
     if name not in file.variables:
         return None
-    found = getattr(file[name], "units", units)
-    if found != units or len(file[name]) == 0:
+    variable = file[name]
+    found = getattr(variable, "units", units)
+    if variable.ndim == 0 or found != units or len(variable) == 0:
         raise ValueError(
-            f"{path} has {len(file[name])} frames of {name} in {found}: {units} needed"
+            f"{path} has {len(variable) if variable.ndim else 0} frames of {name} in {found}: "
+            f"{units} needed"
         )
-    return np.asarray(file[name][-1], dtype=np.float64)
+    if variable.shape[1:] != shape:
+        if name == "coordinates" and variable.shape[2:] == (3,):
+            raise ValueError(f"{path} holds {variable.shape[1]} particles: {shape[0]} are needed")
+        raise ValueError(f"{path} has {name} of shape {variable.shape[1:]}: {shape} is needed")
+    variable.set_auto_mask(True)
+    try:
+        return checked_numbers(f"{name} of the last frame", variable[-1])
+    except (OSError, RuntimeError, ValueError) as error:
+        raise ValueError(f"{path} cannot be read: {error}") from error
+
+
+def _refuse_overlaps(path: Path, position: np.ndarray, length: float) -> None:
+    """Raise ValueError that names the first two lines whose spheres overlap."""
+    wrapped = wrap(position, length)
+    extent = np.ptp(position, axis=0).max()
+    hint = "; in units of a diameter: these look like metres" if extent < 1.0 else ""
+    if len(position) < 2:
+        return
+    # Cells first: a tree of points that lie all in one place takes for ever.
+    _, cell, count = np.unique(np.floor(wrapped), axis=0, return_inverse=True, return_counts=True)
+    if count.max() > MOST_IN_A_CELL:
+        rows = np.flatnonzero(cell.ravel() == count.argmax())[: MOST_IN_A_CELL + 1]
+        distance, nearest = cKDTree(wrapped[rows]).query(wrapped[rows], k=2)
+        nearest = rows[nearest]
+    else:
+        rows = np.arange(len(position))
+        distance, nearest = cKDTree(wrapped, boxsize=length).query(wrapped, k=2)
+    closest = distance[:, 1].argmin()
+    if distance[closest, 1] < CONTACT - TOUCH:
+        i, j = sorted((int(rows[closest]), int(nearest[closest, 1])))
+        raise ValueError(
+            f"{path}: particles {i} and {j} (counted from 0) overlap, their centres are "
+            f"{distance[closest, 1]:.3g} d_p apart: at least {CONTACT:g} is needed{hint}"
+        )
 
 
 @njit(cache=True)

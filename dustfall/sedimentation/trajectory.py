@@ -1,18 +1,24 @@
 """What a run leaves behind: its trajectory, its series, and the records they are made from."""
 
+import hashlib
+import math
 import os
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 
 from dustfall import __version__
-from dustfall.columns import Column
+from dustfall.columns import Column, started_checksum
 from dustfall.extras import extra
 from dustfall.files import atomic
 
 with extra("files"):
     import netCDF4
+
+CHECKED_AT_ONCE = 2**24
+"""Bytes of a variable that are in memory at a time when its checksum is taken."""
 
 TRACKED = 3
 """Particles whose position, velocity and force the series holds at every step."""
@@ -54,33 +60,46 @@ class Records:
     """Records of one fixed size, appended to a plain file.
 
     A file of fixed-size records can be cut back to a known count, which is what a run needs that
-    was killed while it wrote; a half-written NetCDF file is lost.
+    was killed while it wrote; a half-written NetCDF file is lost. `digest()` is that of all records
+    so far; whoever goes on from `count` records hands in what it was then.
 
     Raises
     ------
-    ValueError : the file holds fewer than `count` records.
+    ValueError : the file holds fewer than `count` records, or others.
     """
 
-    def __init__(self, path: Path, record: np.dtype, count: int = 0):
+    def __init__(self, path: Path, record: np.dtype, count: int = 0, digest: str = ""):
         self.path = path
         self.record = record
+        self._hash = hashlib.sha256()
         self.file = open(path, "r+b" if count else "w+b")  # noqa: SIM115 - open for a whole run
-        size = os.fstat(self.file.fileno()).st_size
-        if size < count * record.itemsize:
+        try:
+            for k in range(count):
+                written = self.file.read(record.itemsize)
+                if len(written) < record.itemsize:
+                    raise ValueError(f"{path} holds {k} records, {count} are expected")
+                self._hash.update(written)
+            if count and self.digest() != digest:
+                raise ValueError(f"{path} is damaged: its records do not match their checksum")
+        except ValueError:
             self.file.close()
-            raise ValueError(
-                f"{path} holds {size // record.itemsize} records, {count} are expected"
-            )
+            raise
         self.file.truncate(count * record.itemsize)
         self.file.seek(0, os.SEEK_END)
         self.count = count
+
+    def digest(self) -> str:
+        """SHA-256 of all records so far."""
+        return self._hash.hexdigest()
 
     def append(self, **values) -> None:
         """Write one record, given field by field."""
         row = np.empty((), self.record)
         for name in self.record.names or ():
             row[name] = values[name]
-        self.file.write(row.tobytes())
+        written = row.tobytes()
+        self.file.write(written)
+        self._hash.update(written)
         self.count += 1
 
     def sync(self) -> None:
@@ -89,11 +108,22 @@ class Records:
         os.fsync(self.file.fileno())
 
     def __iter__(self) -> Iterator[np.ndarray]:
-        """The records from the first on, one in memory at a time."""
+        """The records from the first on, one in memory at a time.
+
+        Raises ValueError after the last of them where they are not what was written.
+        """
         self.file.flush()
+        found = hashlib.sha256()
         with open(self.path, "rb") as file:
             for _ in range(self.count):
-                yield np.frombuffer(file.read(self.record.itemsize), self.record)[0]
+                written = file.read(self.record.itemsize)
+                found.update(written)
+                yield np.frombuffer(written, self.record)[0]
+        if found.hexdigest() != self.digest():
+            raise ValueError(
+                f"{self.path} was damaged while the run went on; the same call goes on from the "
+                "last state that stands on whole records"
+            )
 
     def remove(self) -> None:
         """Close the file and delete it."""
@@ -159,12 +189,19 @@ def write_trajectory(path: Path, frames: Records, box_length: float, attributes:
                 words,
                 chunksizes=(1, *field.shape),
             )
+        written = {"time": time, "cell_lengths": lengths, "cell_angles": angles, **columns}
+        checksums = {
+            name: started_checksum(column.dtype, (frames.count, *column.shape[1:]))
+            for name, column in written.items()
+        }
         for k, frame in enumerate(frames):
-            time[k] = frame["time"]
-            lengths[k] = box_length
-            angles[k] = 90.0
-            for name, column in columns.items():
-                column[k] = frame[name]
+            values = {"cell_lengths": np.full(3, box_length), "cell_angles": np.full(3, 90.0)}
+            for name, column in written.items():
+                row = values[name] if name in values else frame[name]
+                column[k] = row
+                checksums[name].update(row.tobytes())
+        for name, column in written.items():
+            column.sha256 = checksums[name].hexdigest()
 
 
 def write_series(
@@ -193,3 +230,45 @@ def write_series(
             column.units = units
             column.long_name = meaning
             column[:] = rows[name]
+            checksum = started_checksum(rows[name].dtype, rows[name].shape)
+            checksum.update(rows[name].tobytes())
+            column.sha256 = checksum.hexdigest()
+
+
+@contextmanager
+def open_run(path: str | Path) -> Iterator[netCDF4.Dataset]:
+    """Open a trajectory or series, after its variables were compared with their checksums.
+
+    A file of another program has none. Raises FileNotFoundError where there is no such file, and
+    ValueError, with the names of file and variable, for one that is damaged or no NetCDF file.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise FileNotFoundError(f"there is no file {path}")
+    try:
+        file = netCDF4.Dataset(path)
+    except (OSError, RuntimeError, ValueError, KeyError, AttributeError) as error:
+        raise ValueError(f"{path} is damaged or no NetCDF file ({error})") from error
+    with file:
+        file.set_auto_mask(False)
+        for name, variable in file.variables.items():
+            try:
+                whole = "sha256" not in variable.ncattrs() or variable.sha256 == _checksum(variable)
+            except (OSError, RuntimeError, ValueError, AttributeError, IndexError):
+                whole = False
+            if not whole:
+                raise ValueError(
+                    f"{path} is damaged, or was changed: its variable {name} does not match its "
+                    "attribute sha256, which whoever changes it on purpose removes"
+                )
+        yield file
+
+
+def _checksum(variable: netCDF4.Variable) -> str:
+    """Of what a variable holds, read part by part."""
+    checksum = started_checksum(variable.dtype, variable.shape)
+    row = max(1, variable.dtype.itemsize * math.prod(variable.shape[1:]))
+    rows = max(1, CHECKED_AT_ONCE // row)
+    for first in range(0, variable.shape[0], rows):
+        checksum.update(np.ascontiguousarray(variable[first : first + rows]).tobytes())
+    return checksum.hexdigest()

@@ -106,6 +106,14 @@ def test_vectors_do_not_change_under_translation():
         (np.zeros((6, 2)), 1.0, r"\(6, 2\)"),
         (np.zeros((6, 3)), 0.0, "box_length is"),
         (np.where(np.arange(18).reshape(6, 3) == 7, np.nan, 0.5), 1.0, "particle 2"),
+        (
+            np.where(np.arange(18).reshape(6, 3) == 7, 1e300, 0.5),
+            1.0,
+            "particle 2 .* 1e[+]09 sides",
+        ),
+        (np.zeros((6, 3)), 1e300, "box_length is"),
+        (np.ma.masked_equal(np.eye(6, 3), 1.0), 20.0, r"value at \[0, 0\] is missing"),
+        (["near", "far"], 1.0, "positions must be an array of numbers"),
     ],
 )
 def test_impossible_input_is_refused_by_name(position, side, named):

@@ -1,3 +1,5 @@
+import warnings
+
 import pytest
 
 from dustfall.sedimentation import Properties
@@ -51,3 +53,17 @@ def test_impossible_properties_are_refused_by_name(wrong, named):
 def test_unknown_way_to_the_galileo_number_is_refused():
     with pytest.raises(ValueError, match="fluid_density"):
         Properties().with_galileo_multiple(2, "fluid_density")
+
+
+def test_what_is_no_stokes_flow_is_refused_and_what_may_be_none_is_told():
+    dust = Properties()
+    with pytest.raises(ValueError, match=r"Galileo number is .*diameter 25, .*is allowed up to 1"):
+        Properties(diameter=25.0).check_stokes_flow()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        dust.with_galileo_multiple(0.5 / dust.galileo * 0.999).check_stokes_flow()
+    for multiple in (0.501, 0.999):
+        with pytest.warns(UserWarning, match="inertia of the fluid"):
+            dust.with_galileo_multiple(multiple / dust.galileo).check_stokes_flow()
+    with pytest.raises(ValueError, match="Galileo number is 1"):
+        dust.with_galileo_multiple(1.001 / dust.galileo).check_stokes_flow()

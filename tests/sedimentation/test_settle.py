@@ -328,7 +328,7 @@ def test_run_that_crashes_amid_a_checkpoint_goes_on_to_the_same_bits(
     assert_same_files(tmp_path, undisturbed)
 
 
-@pytest.mark.parametrize("last", ["state.npz", "state.previous.npz", "frames.bin", "series.bin"])
+@pytest.mark.parametrize("last", ["state.bin", "state.previous.bin", "frames.bin", "series.bin"])
 def test_run_that_crashes_amid_its_clearing_up_goes_on_to_the_same_bits(
     tmp_path, undisturbed, monkeypatch, last
 ):
@@ -374,7 +374,7 @@ def test_interrupted_run_goes_on_to_the_same_bits_with_a_model_that_minds_the_or
 
 # Half of the records is less than either state stands on: such a run begins anew.
 @pytest.mark.parametrize(
-    ("damaged", "resumed"), [("state.npz", 10), ("frames.bin", 0), ("series.bin", 0)]
+    ("damaged", "resumed"), [("state.bin", 10), ("frames.bin", 0), ("series.bin", 0)]
 )
 def test_run_with_a_damaged_checkpoint_goes_on_to_the_same_bits(
     tmp_path, undisturbed, damaged, resumed
@@ -390,6 +390,46 @@ def test_run_with_a_damaged_checkpoint_goes_on_to_the_same_bits(
     assert_same_files(tmp_path, undisturbed)
 
 
+@pytest.mark.parametrize("file", ["state.bin", "frames.bin", "series.bin"])
+def test_no_flipped_bit_of_a_checkpoint_gets_into_the_results(tmp_path, undisturbed, file):
+    checkpoint = tmp_path / "checkpoint"
+    rng = np.random.default_rng(5)
+    for _ in range(4):
+        with pytest.raises(Interruption):
+            run(tmp_path, checkpoint=checkpoint, checkpoint_interval=0.0, progress=interrupt_at(11))
+        damaged = bytearray((checkpoint / file).read_bytes())
+        damaged[rng.integers(len(damaged))] ^= 1 << rng.integers(8)
+        (checkpoint / file).write_bytes(damaged)
+        run(tmp_path, checkpoint=checkpoint)
+        assert_same_files(tmp_path, undisturbed)
+
+
+@pytest.mark.parametrize("content", [b"", b"text\n", b"PK\x03\x04", b"\x93NUMPY\x01\x00"])
+def test_a_checkpoint_of_another_kind_heals_like_a_damaged_one(tmp_path, undisturbed, content):
+    checkpoint = tmp_path / "checkpoint"
+    checkpoint.mkdir()
+    for name in ("state.bin", "state.previous.bin"):
+        (checkpoint / name).write_bytes(content)
+    run(tmp_path, checkpoint=checkpoint)
+    assert_same_files(tmp_path, undisturbed)
+
+
+def test_records_damaged_while_a_run_goes_on_are_told_and_healed(tmp_path, undisturbed):
+    checkpoint = tmp_path / "checkpoint"
+
+    def damage(done, total):
+        if done == total:
+            with open(checkpoint / "frames.bin", "r+b") as file:
+                file.seek(100)
+                file.write(b"damage")
+
+    with pytest.raises(ValueError, match=r"frames\.bin was damaged while the run went on"):
+        run(tmp_path, checkpoint=checkpoint, checkpoint_interval=0.0, progress=damage)
+    assert not (tmp_path / "case.nc").exists()
+    run(tmp_path, checkpoint=checkpoint)
+    assert_same_files(tmp_path, undisturbed)
+
+
 @pytest.mark.parametrize("lost", ["frames.bin", "series.bin"])
 def test_run_whose_records_are_lost_begins_anew(tmp_path, undisturbed, lost):
     checkpoint = tmp_path / "checkpoint"
@@ -400,16 +440,17 @@ def test_run_whose_records_are_lost_begins_anew(tmp_path, undisturbed, lost):
     assert_same_files(tmp_path, undisturbed)
 
 
-def test_terminated_run_saves_its_state_and_goes_on_to_the_same_bits(tmp_path, undisturbed):
-    checkpoint = tmp_path / "checkpoint"
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_terminated_run_saves_its_state_and_goes_on_to_the_same_bits(tmp_path, undisturbed, number):
+    checkpoint, before = tmp_path / "checkpoint", signal.getsignal(number)
 
     def terminate(done, total):
         if done == 8:
-            os.kill(os.getpid(), signal.SIGTERM)
+            os.kill(os.getpid(), number)
 
     with pytest.raises(SystemExit, match="after step 9 of 20"):
         run(tmp_path, checkpoint=checkpoint, progress=terminate)
-    assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+    assert signal.getsignal(number) == before
     steps = []
     run(tmp_path, checkpoint=checkpoint, progress=lambda done, total: steps.append(done))
     assert steps[0] == 9
@@ -453,6 +494,8 @@ def test_foreign_files_in_the_checkpoint_folder_stay(tmp_path):
         ({"step": 0.0}, "step is 0.0"),
         ({"duration": 0.55, "save_interval": 0.1}, "duration is 0.55"),
         ({"save_interval": 0.25}, "save_interval is 0.25"),
+        ({"duration": 1e300}, r"duration is 1e\+300"),
+        ({"properties": Properties(diameter=25.0)}, "the Galileo number is 7.*e\\+16"),
         ({"start": "flying"}, "start is 'flying'"),
         ({"precision": "float16"}, "precision is 'float16'"),
         ({"particles": 5}, "5 particles: at least 6"),

@@ -54,10 +54,83 @@ def test_files_that_do_not_fit_are_refused_by_name(tmp_path):
         dataset.coordinates.attrs["units"] = "m"
         dataset.to_netcdf(tmp_path / "metres.nc")
         dataset.drop_vars("coordinates").to_netcdf(tmp_path / "empty.nc")
+        for name in dataset.variables:
+            dataset[name].attrs.pop("sha256", None)
+        dataset.coordinates.attrs["units"] = "d_p"
+        dataset.coordinates[-1, 7, 1] = np.nan
+        encoding = {"coordinates": {"_FillValue": -1.0}}
+        dataset.to_netcdf(tmp_path / "hole.nc", encoding=encoding)
+    with pytest.raises(ValueError, match=r"hole\.nc.*the value at \[7, 1\] is missing"):
+        read_start(tmp_path / "hole.nc", 40, 1e-3)
     with pytest.raises(ValueError, match="coordinates in m: d_p needed"):
         read_start(tmp_path / "metres.nc", 40, 1e-3)
     with pytest.raises(ValueError, match="no variable coordinates"):
         read_start(tmp_path / "empty.nc", 40, 1e-3)
+
+
+def flipped(whole: bytes, rng) -> bytes:
+    damaged = bytearray(whole)
+    damaged[rng.integers(len(whole))] ^= 1 << rng.integers(8)
+    return bytes(damaged)
+
+
+def test_no_flipped_bit_of_a_trajectory_moves_a_particle_unseen(tmp_path):
+    run(tmp_path, positions=POSITIONS)
+    path = tmp_path / "case.nc"
+    whole, expected = path.read_bytes(), read_start(path, 40, 1e-3)
+    rng, told = np.random.default_rng(3), []
+    for _ in range(200):
+        path.write_bytes(flipped(whole, rng))
+        try:
+            found = read_start(path, 40, 1e-3)
+        except ValueError as error:
+            told.append(str(error))
+            continue
+        for one, other in zip(found, expected, strict=True):
+            np.testing.assert_array_equal(one, other)
+    assert len(told) > 50
+    assert all("case.nc" in words for words in told)
+
+
+TABLES = {
+    "text": ("no table at all\n", "no table of numbers: could not convert .* at row 0, column 1"),
+    "hole": ("1 2 3\n4 5\n", "no table of numbers: the number of columns changed .* at row 2"),
+    "nan": ("1 2 3\n4 nan 6\n", r"positions at the start hold \[4.0, nan, 6.0\] for particle 1"),
+    "far": ("1 2 3\n4 1e300 6\n", r"hold \[4.0, 1e\+300, 6.0\] for particle 1: allowed are finite"),
+    "wild": ("1 2 3 0 0 0\n4 5 6 0 0 1e6\n", "velocities at the start hold .* at most 100 v_s"),
+    "metres": ("1e-5 2e-4 3e-4\n4e-5 5e-5 6e-4\n", "particles 0 and 1 .*: these look like metres"),
+    "overlap": ("1 2 3\n1.5 2 3\n", "particles 0 and 1 .* 0.5 d_p apart: at least 1 is needed"),
+    "empty": ("", "holds no particle: 2 are needed"),
+    "columns": ("1 2\n3 4\n", "has 2 columns: 3 or 6 are needed"),
+    "large": (" " * 200_000, "has 200000 bytes: a table of 2 particles has at most"),
+    "bytes": ("\udcff\udcfe\n", "no table of numbers"),
+    "wrapped": ("0.2 5 5\n12.6 5 5\n", r"particles 0 and 1 .* 0\.17\d* d_p apart"),
+}
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_tables_that_are_no_start_are_refused_with_file_row_and_what_is_allowed(tmp_path, name):
+    content, words = TABLES[name]
+    path = tmp_path / f"{name}.txt"
+    path.write_bytes(content.encode("utf-8", "surrogateescape"))
+    with pytest.raises(ValueError, match=words) as refusal:
+        # A cube of 12.57 d_p.
+        read_start(path, 2, 5.27e-4)
+    assert f"{name}.txt" in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+def test_many_particles_in_one_place_are_refused_at_once(tmp_path):
+    path = tmp_path / "start.txt"
+    np.savetxt(path, np.full((100_000, 3), 0.5), fmt="%g")
+    with pytest.raises(ValueError, match="overlap"):
+        read_start(path, 100_000, 1e-3)
+
+
+def test_a_folder_and_a_device_are_no_start(tmp_path):
+    for path in (tmp_path, "/dev/zero"):
+        with pytest.raises(ValueError, match="is no file"):
+            read_start(path, 40, 1e-3)
 
 
 @pytest.mark.parametrize(
@@ -67,6 +140,9 @@ def test_files_that_do_not_fit_are_refused_by_name(tmp_path):
         ({"velocity": VELOCITIES * np.inf}, "velocities at the start"),
         ({"velocity": "flying"}, "start is 'flying'"),
         ({"position": np.where(POSITIONS > 5, np.nan, POSITIONS)}, "positions at the start"),
+        ({"position": np.ma.masked_greater(POSITIONS, 5)}, "the value at .* is missing"),
+        ({"position": 1e20 * POSITIONS}, "positions at the start"),
+        ({"position": "here"}, "positions must be an array of numbers"),
     ],
 )
 def test_starts_that_cannot_be_are_refused_by_name(change, named):

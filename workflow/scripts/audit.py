@@ -12,7 +12,7 @@ from dustfall.dataset import SOLUTION_COLUMNS
 from dustfall.files import atomic
 from dustfall.scenes import SCENE_COLUMNS
 
-progress, params = joblog.start(snakemake.log[0]), snakemake.params
+progress, params = joblog.start(snakemake), snakemake.params
 other = "multipole" if params.method == "elements" else "elements"
 tolerance = max(params.tolerance, TOLERANCE)
 # No method audits itself.

@@ -7,7 +7,7 @@ import yaml
 import joblog
 from dustfall.files import atomic
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 
 with atomic(snakemake.output[0]) as path:
     settings = json.loads(snakemake.params.config)

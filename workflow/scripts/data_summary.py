@@ -11,7 +11,7 @@ from dustfall.analysis.distributions import force_summary
 from dustfall.dataset import read
 from dustfall.files import atomic
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 
 data = read(snakemake.input.data)
 summary = {}

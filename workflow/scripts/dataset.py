@@ -7,7 +7,7 @@ import joblog
 from dustfall.dataset import Shard, aggregate, summary, write
 from dustfall.files import atomic
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 params = snakemake.params
 
 shards = [

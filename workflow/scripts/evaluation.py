@@ -10,7 +10,7 @@ from dustfall.files import atomic
 from dustfall.forces.formulas import FORMULAS
 from dustfall.forces.learned import load_model
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 params = snakemake.params
 
 _, test = split(read(snakemake.input.data), params.test_share, params.seed)

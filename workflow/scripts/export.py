@@ -3,7 +3,7 @@
 import joblog
 from dustfall.sedimentation.export import export_vtkhdf
 
-progress = joblog.start(snakemake.log[0])
+progress = joblog.start(snakemake)
 export_vtkhdf(
     snakemake.input.trajectory,
     snakemake.output[0],

@@ -8,7 +8,7 @@ import joblog
 from dustfall.figures.audit import audit
 from dustfall.figures.style import save
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 
 table = pd.read_csv(snakemake.input.audit)
 save(audit(table), table, Path(snakemake.output.png).with_suffix(""))

@@ -9,7 +9,7 @@ from dustfall.analysis.spectra import cloud_spectra
 from dustfall.figures.fluctuations import cloud_spectra as draw
 from dustfall.figures.style import save
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 
 params = snakemake.params
 trajectories = [xr.open_dataset(path) for path in snakemake.input.trajectories]

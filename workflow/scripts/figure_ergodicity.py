@@ -9,7 +9,7 @@ from dustfall.analysis.ergodicity import ergodicity_table
 from dustfall.figures.fluctuations import ergodicity
 from dustfall.figures.style import save
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 
 trajectories = [xr.open_dataset(path) for path in snakemake.input.trajectories]
 table = ergodicity_table(trajectories, snakemake.params.statistics_from)

@@ -10,7 +10,7 @@ from dustfall.figures.style import save
 from dustfall.forces.formulas import FORMULAS
 from dustfall.forces.registry import trained_models
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 
 models = [*FORMULAS, *trained_models()]
 found = read_columns(snakemake.input.predictions, prediction_columns(models))

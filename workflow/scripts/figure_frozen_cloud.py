@@ -7,7 +7,7 @@ from dustfall.analysis.frozen_cloud import frozen_cloud_table
 from dustfall.figures.frozen_cloud import frozen_cloud
 from dustfall.figures.style import save
 
-progress = joblog.start(snakemake.log[0])
+progress = joblog.start(snakemake)
 
 params = snakemake.params
 table = frozen_cloud_table(

@@ -9,7 +9,7 @@ from dustfall.analysis.settling import inverse_beta_table
 from dustfall.figures.settling import inverse_beta
 from dustfall.figures.style import save
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 
 steady = pd.read_csv(snakemake.input.steady)
 table = inverse_beta_table(steady)

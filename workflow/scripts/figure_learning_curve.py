@@ -8,7 +8,7 @@ import joblog
 from dustfall.figures.forces import learning_curve
 from dustfall.figures.style import save
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 
 table = pd.read_csv(snakemake.input.table)
 save(learning_curve(table), table, Path(snakemake.output.png).with_suffix(""))

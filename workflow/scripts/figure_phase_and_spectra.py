@@ -9,7 +9,7 @@ from dustfall.analysis.spectra import phase_and_spectra
 from dustfall.figures.settling import phase_and_spectra as draw
 from dustfall.figures.style import save
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 
 params = snakemake.params
 runs = [xr.load_dataset(path) for path in snakemake.input.series]

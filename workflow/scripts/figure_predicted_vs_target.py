@@ -9,7 +9,7 @@ from dustfall.columns import read_columns
 from dustfall.figures.forces import predicted_vs_target
 from dustfall.figures.style import save
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 
 models = ["idnn", "dense", "anchored"]
 found = read_columns(snakemake.input.predictions, prediction_columns(models))

@@ -15,7 +15,7 @@ from dustfall.stokes.elements.mesh_files import element_table
 from dustfall.stokes.elements.scene import NARROWEST_GAP, fixed_spheres_on_meshes
 from dustfall.units import CONTACT
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 
 shards = [read_columns(path, SCENE_COLUMNS)["neighbours"] for path in snakemake.input.scenes]
 neighbours = np.concatenate(shards)

@@ -8,7 +8,7 @@ from dustfall.dataset import read
 from dustfall.figures.forces import spearman
 from dustfall.figures.style import save
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 
 data = read(snakemake.input.data)
 data = data.select(data.radial_law == snakemake.params.radial_law)

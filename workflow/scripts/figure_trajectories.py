@@ -9,7 +9,7 @@ from dustfall.analysis.settling import tracked_trajectories
 from dustfall.figures.settling import trajectories
 from dustfall.figures.style import save
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 
 table = tracked_trajectories(xr.load_dataset(path) for path in snakemake.input.series)
 save(trajectories(table), table, Path(snakemake.output.png).with_suffix(""))

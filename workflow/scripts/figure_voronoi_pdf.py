@@ -9,7 +9,7 @@ from dustfall.analysis.voronoi import voronoi_pdf_table
 from dustfall.figures.style import save
 from dustfall.figures.voronoi import voronoi_pdf
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 
 params = snakemake.params
 cells = [xr.open_dataset(path) for path in snakemake.input.cells]

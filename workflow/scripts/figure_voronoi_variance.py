@@ -10,7 +10,7 @@ from dustfall.analysis.voronoi import voronoi_variance_table
 from dustfall.figures.style import save
 from dustfall.figures.voronoi import voronoi_variance
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 
 params = snakemake.params
 steady = pd.read_csv(snakemake.input.steady)

@@ -7,7 +7,7 @@ from dustfall.analysis.independence import independence_of_n
 from dustfall.files import atomic
 from dustfall.sedimentation.closures.all_particles import AllParticles
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 
 steady = pd.read_csv(snakemake.input.steady)
 # Where all particles feel each other, what is found depends on the box: that is no question.

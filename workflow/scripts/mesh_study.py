@@ -4,7 +4,7 @@ import joblog
 from dustfall.benchmarks.mesh_study import convergence_table, mesh_study
 from dustfall.files import atomic
 
-progress = joblog.start(snakemake.log[0])
+progress = joblog.start(snakemake)
 
 study = mesh_study(snakemake.params.sizes, progress("mesh study", "meshes"))
 convergence = convergence_table(study)

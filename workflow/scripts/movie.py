@@ -5,7 +5,7 @@ import xarray as xr
 import joblog
 from dustfall.figures.movie import save_movie
 
-progress = joblog.start(snakemake.log[0])
+progress = joblog.start(snakemake)
 
 save_movie(
     xr.open_dataset(snakemake.input.trajectory),

@@ -6,7 +6,7 @@ import joblog
 from dustfall.analysis.neighbour_changes import neighbour_changes
 from dustfall.files import atomic
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 
 runs = (xr.load_dataset(path) for path in snakemake.input.series)
 with atomic(snakemake.output[0]) as path:

@@ -6,7 +6,7 @@ import joblog
 from dustfall.analysis.neighbour_numbers import neighbour_numbers_table
 from dustfall.files import atomic
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 
 runs = (xr.load_dataset(path) for path in snakemake.input.series)
 table = neighbour_numbers_table(runs, snakemake.params.statistics_from)

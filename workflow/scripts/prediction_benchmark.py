@@ -12,7 +12,7 @@ from dustfall.figures.style import save
 from dustfall.forces.formulas import FORMULAS
 from dustfall.forces.learned import load_model
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 
 neighbours = read(snakemake.input.data).neighbours
 models = [*map(load_model, snakemake.input.models), *FORMULAS.values()]

@@ -4,7 +4,7 @@ import joblog
 from dustfall.analysis.voronoi import random_sphere_table
 from dustfall.files import atomic
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 
 table = random_sphere_table(snakemake.params.volume_fractions, snakemake.params.seed)
 with atomic(snakemake.output[0]) as path:

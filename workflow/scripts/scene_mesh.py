@@ -8,7 +8,7 @@ from dustfall.scenes import SCENE_COLUMNS
 from dustfall.stokes.elements.mesh_files import write_scene_mesh
 from dustfall.stokes.elements.scene import fixed_spheres_on_meshes
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 
 shard = read_columns(snakemake.input.scenes, SCENE_COLUMNS)
 (own,) = np.flatnonzero(shard["scene"] == snakemake.params.number)

@@ -6,7 +6,7 @@ import joblog
 from dustfall.columns import write_columns
 from dustfall.scenes import SCENE_COLUMNS, random_scenes
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 params = snakemake.params
 
 numbers = np.arange(*params.numbers)

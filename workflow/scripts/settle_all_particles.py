@@ -1,9 +1,10 @@
 """Let the particles of one case settle, all of them coupled through the fluid."""
 
+import joblog
 from dustfall.sedimentation.closures.all_particles import AllParticles
 from settling import properties_of, settle_case
 
-params = snakemake.params
+progress, params = joblog.start(snakemake), snakemake.params
 properties = properties_of(params)
 closure = AllParticles(
     properties,
@@ -12,4 +13,4 @@ closure = AllParticles(
     tolerance=params.tolerance,
     threads=snakemake.threads,
 )
-settle_case(snakemake, closure, properties)
+settle_case(snakemake, closure, properties, progress)

@@ -2,18 +2,18 @@
 
 import hashlib
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
-import joblog
 from dustfall.sedimentation.properties import Properties
 from dustfall.sedimentation.settle import Checkpoint, Output, Schedule, settle
 from dustfall.sedimentation.start import random_start, read_start, start_from
 from dustfall.sedimentation.state import Closure
+from workflow import stops
 
 
-def settle_case(snakemake, closure: Closure, properties: Properties) -> None:
+def settle_case(snakemake, closure: Closure, properties: Properties, progress: Callable) -> None:
     """Let a case settle from its start, or go on where it was killed."""
-    progress = joblog.start(snakemake.log[0])
     params, case = snakemake.params, Path(snakemake.output.trajectory).stem
     if snakemake.input.start:
         position, velocity = read_start(
@@ -37,7 +37,12 @@ def settle_case(snakemake, closure: Closure, properties: Properties) -> None:
     )
     schedule = Schedule(params.step, params.duration, params.save_every)
     checkpoint = Checkpoint(_checkpoint(snakemake), snakemake.resources.checkpoint_interval)
-    done = settle(closure, start, properties, schedule, output, checkpoint, progress(case, "steps"))
+    bar = progress(case, "steps")
+    try:
+        done = settle(closure, start, properties, schedule, output, checkpoint, bar)
+    except SystemExit as stop:
+        stops.note(f"{case}: {stop}")
+        raise
     rate = done["steps_per_second"]
     print(f"{done['steps']} steps in {done['seconds']:.1f} s, {rate:.3g} a second")
 

@@ -8,7 +8,7 @@ from dustfall.scenes import SCENE_COLUMNS
 from dustfall.solution import Status
 from dustfall.stokes.records import solve_shard, write_records
 
-progress = joblog.start(snakemake.log[0])
+progress = joblog.start(snakemake)
 
 shard = read_columns(snakemake.input.scenes, SCENE_COLUMNS)
 tolerance, scene = snakemake.params.tolerance, shard["scene"]

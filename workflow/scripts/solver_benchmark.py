@@ -12,7 +12,7 @@ from dustfall.figures.style import save
 from dustfall.files import atomic
 from dustfall.scenes import random_scenes
 
-progress = joblog.start(snakemake.log[0])
+progress = joblog.start(snakemake)
 params = snakemake.params
 
 low, high = np.log10([params.phi_min, params.phi_max])

@@ -6,7 +6,7 @@ import joblog
 from dustfall.analysis.settling import steady_state
 from dustfall.files import atomic
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 
 quantities = [
     "settling_velocity_mean",

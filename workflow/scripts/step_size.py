@@ -6,7 +6,7 @@ import joblog
 from dustfall.analysis.step_size import step_size_table
 from dustfall.files import atomic
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 
 runs = [xr.load_dataset(path) for path in snakemake.input.series]
 params = snakemake.params

@@ -6,7 +6,7 @@ import joblog
 from dustfall.benchmarks import stress
 from dustfall.files import atomic
 
-progress = joblog.start(snakemake.log[0])
+progress = joblog.start(snakemake)
 
 tolerances = snakemake.params.tolerances
 table = pd.concat(

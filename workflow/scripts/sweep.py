@@ -8,7 +8,7 @@ from dustfall.files import atomic
 from dustfall.training.cross_validation import cross_validate
 from dustfall.training.fit import TrainingSettings
 
-progress = joblog.start(snakemake.log[0])
+progress = joblog.start(snakemake)
 params = snakemake.params
 
 training, _ = split(read(snakemake.input.data), params.test_share, params.seed)

@@ -7,7 +7,7 @@ import joblog
 from dustfall.dataset import read, split
 from dustfall.training.fit import TrainingSettings, train_model
 
-progress = joblog.start(snakemake.log[0])
+progress = joblog.start(snakemake)
 params = snakemake.params
 kind = snakemake.wildcards.model
 

@@ -12,7 +12,7 @@ from dustfall.forces.features import KINDS
 from dustfall.streams import Purpose, stream
 from dustfall.training.fit import TrainingSettings, train_model
 
-progress = joblog.start(snakemake.log[0])
+progress = joblog.start(snakemake)
 params, wildcards = snakemake.params, snakemake.wildcards
 
 training, test = split(read(snakemake.input.data), params.test_share, params.seed)

@@ -5,7 +5,7 @@ import pandas as pd
 import joblog
 from dustfall.files import atomic
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 
 tables = [pd.read_csv(path) for path in snakemake.input]
 whole = [table.groupby(["radial_law", "component"], sort=False).head(1) for table in tables]

@@ -6,7 +6,7 @@ import joblog
 from dustfall.files import atomic
 from workflow.validation import collect, copy_pictures, page, provenance
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 
 params = snakemake.params
 campaign, docs = Path(), Path(params.docs)

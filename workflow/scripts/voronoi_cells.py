@@ -6,7 +6,7 @@ import joblog
 from dustfall.analysis.voronoi import cell_volumes
 from dustfall.files import atomic
 
-progress = joblog.start(snakemake.log[0])
+progress = joblog.start(snakemake)
 
 params = snakemake.params
 with xr.open_dataset(snakemake.input.trajectory) as trajectory:

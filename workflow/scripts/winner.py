@@ -10,7 +10,7 @@ from dustfall.files import atomic
 from dustfall.forces.learned import multiplications
 from dustfall.training.cross_validation import choose_winner
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 
 results = [json.loads(Path(path).read_text()) for path in snakemake.input.results]
 winner = choose_winner(results)

@@ -1,0 +1,81 @@
+"""Why a run stopped, in one sentence at the end of what the terminal shows.
+
+A job that stops leaves its sentence in `logs/stopped`; Snakemake's process says it last.
+"""
+
+import atexit
+import errno
+import os
+import re
+import shlex
+import sys
+from contextlib import suppress
+from pathlib import Path
+
+from workflow.checksums import RESULTS
+
+NOTE = Path("logs/stopped")
+SCRIPTS = Path(".snakemake/scripts")
+
+CAUSES = {
+    errno.ENOSPC: "the disk is full",
+    errno.EDQUOT: "the quota of the disk is used up",
+    errno.EACCES: "no permission to write or read there",
+    errno.EROFS: "the file system is read-only",
+    errno.ENOMEM: "the memory is used up",
+}
+"""What the errors of the system mean that a campaign meets."""
+
+
+def sentence(error: BaseException) -> str:
+    """Say in one line what an exception means."""
+    words = " ".join(str(error).split())
+    if isinstance(error, OSError) and error.errno in CAUSES:
+        file = f"{error.filename}: " if error.filename else ""
+        return f"{file}{CAUSES[error.errno]}"
+    if isinstance(error, MemoryError):
+        return f"{CAUSES[errno.ENOMEM]}: {words}" if words else CAUSES[errno.ENOMEM]
+    return words or type(error).__name__
+
+
+def note(words: str) -> None:
+    """Leave a sentence for the end; without one, where even that finds no place."""
+    with suppress(OSError):
+        NOTE.parent.mkdir(exist_ok=True)
+        with open(NOTE, "a", encoding="utf-8") as file:
+            file.write(f"{words}\n")
+
+
+def clear() -> None:
+    """Remove what runs leave that nobody needs: notes, Snakemake's copies of scripts of a run that
+    was killed, empty folders. No job may be at work."""
+    NOTE.unlink(missing_ok=True)
+    for script in SCRIPTS.glob("tmp*"):
+        script.unlink(missing_ok=True)
+    for folder, _, _ in os.walk(RESULTS, topdown=False):
+        with suppress(OSError):  # not empty
+            os.rmdir(folder)
+
+
+def announce(logs) -> None:
+    """Say at the very end why the run stopped, and what goes on; `logs` are those of Snakemake."""
+    command = shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])
+    words = "; ".join(dict.fromkeys(_notes())) or _killed(logs) or "the cause is shown above"
+    atexit.register(print, f"Stopped: {words}. To go on: {command}", flush=True)
+
+
+def _notes() -> list[str]:
+    try:
+        return NOTE.read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return []
+
+
+def _killed(logs) -> str:
+    """The signal that a job died of, as the log of Snakemake tells it."""
+    for log in logs:
+        found = re.search(r"died with <Signals\.(SIG\w+)", Path(log).read_text(encoding="utf-8"))
+        if found:
+            short = " (by the system, where memory is short)" if found[1] == "SIGKILL" else ""
+            return f"a job was ended by {found[1]}{short}"
+    return ""
