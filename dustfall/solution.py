@@ -1,4 +1,4 @@
-"""What every solver of fixed spheres returns: the forces, and what is known of them.
+"""What every solver of spheres returns: forces or velocities, and what is known of them.
 
 Stands apart from the solvers so that who reads their records need not load their kernels.
 """
@@ -32,6 +32,49 @@ class Solution:
     """
 
     force: np.ndarray
+    error_estimate: np.ndarray
+    iterations: int
+    residual: float
+    minimum_gap: float
+    status: Status
+
+
+@dataclass(frozen=True)
+class Resistance:
+    """What the fluid exerts on n moving spheres, about their centres, and how well it is known.
+
+    force: (n, 3) [3 pi mu d_p U]. torque: (n, 3), stresslet: (n, 3, 3), symmetric, without trace
+    [pi mu d_p^2 U]. error_estimate: (n,), the largest error of |force| / d, |torque| / d^2 and
+    |stresslet| / d^2, d the sphere's diameter, over the larger of what these themselves are and of
+    the fastest motion of any sphere against the undisturbed flow, |velocity| + d |gradient|.
+    iterations, residual: of the linear system, the latter relative. minimum_gap: smallest distance
+    of two surfaces [d_p], inf for one sphere. status: how it ended.
+    """
+
+    force: np.ndarray
+    torque: np.ndarray
+    stresslet: np.ndarray
+    error_estimate: np.ndarray
+    iterations: int
+    residual: float
+    minimum_gap: float
+    status: Status
+
+
+@dataclass(frozen=True)
+class Mobility:
+    """How n spheres move under given forces and torques, and how well it is known.
+
+    velocity: (n, 3) [U]. angular_velocity: (n, 3) [U / d_p]. stresslet: (n, 3, 3), by the fluid
+    [pi mu d_p^2 U]. error_estimate: (n,), the largest error of |velocity|, d |angular_velocity|
+    and |stresslet| / d^2, over the larger of what these are against the undisturbed flow and of
+    the largest |force| / d, |torque| / d^2 and d |gradient| of any sphere. Others as in
+    `Resistance`.
+    """
+
+    velocity: np.ndarray
+    angular_velocity: np.ndarray
+    stresslet: np.ndarray
     error_estimate: np.ndarray
     iterations: int
     residual: float

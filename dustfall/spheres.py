@@ -5,11 +5,14 @@ import numbers
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from dustfall.units import CONTACT
+from dustfall.units import CONTACT, RADIUS
 
 LARGEST = 1e100
 """Largest magnitude of a coordinate [d_p] or a flow, 1 / LARGEST the smallest of a flow that is
 not zero: their squares are numbers still."""
+
+MOST_RATIO = 1e3
+"""Largest ratio of two radii: powers of it up to the 80th are numbers still."""
 
 
 def checked_numbers(name: str, values) -> np.ndarray:
@@ -44,20 +47,83 @@ def checked_positions(centres) -> np.ndarray:
     return centres
 
 
-def checked_centres(centres) -> np.ndarray:
+def checked_centres(centres, radii=None) -> np.ndarray:
     """Centres as an array (n, 3) [d_p] of spheres that do not touch.
 
+    radii: (n,) [d_p], as `checked_radii` returns them; half a diameter by default.
     Raises ValueError for what `checked_positions` refuses, and for spheres that overlap or touch.
     """
     centres = checked_positions(centres)
     distance = centre_distances(centres)
-    i, j = np.unravel_index(distance.argmin(), distance.shape)
-    if distance[i, j] <= CONTACT:
+    contact = CONTACT if radii is None else radii[:, None] + radii
+    i, j = np.unravel_index((distance - contact).argmin(), distance.shape)
+    contact = np.broadcast_to(contact, distance.shape)[i, j]
+    if distance[i, j] <= contact:
         raise ValueError(
             f"spheres {i} and {j} overlap or touch: their centres are {distance[i, j]:.6g} d_p "
-            f"apart, more than {CONTACT:g} is needed"
+            f"apart, more than {contact:g} is needed"
         )
     return centres
+
+
+def checked_radii(radii, n: int) -> np.ndarray:
+    """Radii as an array (n,) [d_p]; half a diameter each where none are given.
+
+    Raises ValueError for another shape, for what is not positive and finite, and where the largest
+    is more than MOST_RATIO times the smallest.
+    """
+    if radii is None:
+        return np.full(n, RADIUS)
+    radii = checked_numbers("radii", radii)
+    if radii.shape != (n,):
+        raise ValueError(
+            f"radii must have the shape ({n},), one for each centre, not {radii.shape}"
+        )
+    bad = np.flatnonzero(~(np.isfinite(radii) & (radii > 0.0)))
+    if len(bad):
+        raise ValueError(f"radius of sphere {bad[0]} is {radii[bad[0]]}: it must be positive")
+    if radii.max() > MOST_RATIO * radii.min():
+        raise ValueError(
+            f"radii from {radii.min():g} to {radii.max():g} d_p: the largest may be at most "
+            f"{MOST_RATIO:g} times the smallest"
+        )
+    return radii
+
+
+def checked_vectors(name: str, vectors, n: int) -> np.ndarray:
+    """Vectors as an array (n, 3), zero where none are given; ValueError for other shapes, holes."""
+    if vectors is None:
+        return np.zeros((n, 3))
+    vectors = checked_numbers(name, vectors)
+    if vectors.shape != (n, 3):
+        raise ValueError(
+            f"{name} must have the shape ({n}, 3), one for each centre, not {vectors.shape}"
+        )
+    bad = np.flatnonzero(~(np.abs(vectors) <= LARGEST).all(axis=1))
+    if len(bad):
+        raise ValueError(
+            f"{name} of sphere {bad[0]} is {vectors[bad[0]].tolist()}: allowed are numbers up to "
+            f"{LARGEST:g}"
+        )
+    return vectors
+
+
+def checked_gradient(gradient) -> np.ndarray:
+    """Velocity gradient far away as an array (3, 3): row i is the gradient of component i.
+
+    Raises ValueError for another shape, numbers that are not finite, and a fluid that expands.
+    """
+    if gradient is None:
+        return np.zeros((3, 3))
+    gradient = checked_numbers("gradient", gradient)
+    if gradient.shape != (3, 3) or not (np.abs(gradient) <= LARGEST).all():
+        raise ValueError(f"gradient must be (3, 3) finite numbers, not {gradient.tolist()}")
+    trace = np.trace(gradient)
+    if abs(trace) > 1e-12 * np.abs(gradient).max():
+        raise ValueError(
+            f"gradient has the trace {trace:g}: fluid keeps its volume, so it must be 0"
+        )
+    return gradient
 
 
 def checked_flow(flow) -> np.ndarray:

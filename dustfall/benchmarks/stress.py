@@ -13,7 +13,7 @@ from dustfall.stokes.elements.one_body import OneBody
 from dustfall.stokes.elements.single_layer import nodal_integrals, self_interaction
 from dustfall.stokes.harmonics import exact_response
 from dustfall.stokes.methods import fixed_spheres
-from dustfall.stokes.multipoles import apply_system, couple_scene, solve_scene
+from dustfall.stokes.multipoles import NO_CLOSE_PAIRS, apply_system, couple_scene, solve_scene
 from dustfall.stokes.plan import SMALLEST_TOLERANCE, plan_scene
 from dustfall.stokes.references.exact_pairs import forces_on_two_spheres
 from dustfall.stokes.solve import response_rows, solve
@@ -257,10 +257,11 @@ def _pair_system(distance, degree) -> np.ndarray:
     """Matrix 1 + T K of two spheres at a distance [d_p], column by column."""
     tables, response = translation_tables(), response_rows(exact_response(degree))
     degrees = np.array([[0, degree], [degree, 0]])
-    scene = couple_scene(distance / RADIUS * CLUSTERS["pair"].astype(float), degrees, tables)
+    centres = distance / RADIUS * CLUSTERS["pair"].astype(float)
+    scene = couple_scene(centres, np.ones(2), degrees, 0, NO_CLOSE_PAIRS, tables)
     columns = []
     for unit in np.eye(6 * (degree + 1) ** 2):
         column = np.empty((len(unit) // 3, 3))
-        apply_system(unit.reshape(-1, 3), scene, degrees, response, tables, column)
+        apply_system(unit.reshape(-1, 3), scene, response, tables, column)
         columns.append(column.ravel())
     return np.array(columns).T

@@ -1,7 +1,17 @@
-"""Forces on fixed spheres in Stokes flow."""
+"""Forces on spheres in Stokes flow, fixed or moving, and velocities under given forces."""
 
-from dustfall.solution import Solution, Status
+from dustfall.solution import Mobility, Resistance, Solution, Status
 from dustfall.stokes.methods import fixed_spheres
+from dustfall.stokes.moving import mobility, resistance
 from dustfall.stokes.solve import forces_on_fixed_spheres
 
-__all__ = ["Solution", "Status", "fixed_spheres", "forces_on_fixed_spheres"]
+__all__ = [
+    "Mobility",
+    "Resistance",
+    "Solution",
+    "Status",
+    "fixed_spheres",
+    "forces_on_fixed_spheres",
+    "mobility",
+    "resistance",
+]

@@ -1,10 +1,12 @@
 """Spheres that see each other through surface harmonics.
 
-The unknowns are the traction moments q_i of each sphere. The incoming flow at sphere i is that of
-infinity less that of the others, so q_i = T (u_inf - sum_j K_ij q_j) with the one-body response T
+The unknowns are the traction moments q_i of each sphere, over its radius a_i, which makes those of
+all spheres alike in size. The incoming flow at sphere i is that of infinity less that of the
+others, so q_i = T (u_inf - sum_j K_ij a_j q_j) with the one-body response T of a sphere of radius 1
 and the couplings K_ij of `translation`. The series of a pair converges geometrically, so each pair
-exchanges no more degrees than its distance and the tolerance ask for. GMRES solves the system,
-which the response preconditions by construction.
+exchanges no more degrees than its distance and the tolerance ask for; a close pair has the coupling
+of `close_pairs` instead, which holds all degrees beyond. GMRES solves the system, which the
+response preconditions by construction.
 """
 
 import numpy as np
@@ -35,13 +37,29 @@ def _add_forces(coupling, begin, moments, i, j, incoming):
 
 
 @njit(cache=True)
-def _add_pair(degree, turns, coupling, tables, q_i, q_j, u_i, u_j, field, spare, lines):
-    """Add to u_i, u_j the velocity that the traction of either sphere makes on the other."""
+def _add_pair(degree, close, turns, coupling, tables, q_i, q_j, u_i, u_j, field, spare, lines):
+    """Add to u_i, u_j the velocity that the traction of either sphere makes on the other.
+
+    On a close pair's spheres it comes back as well.
+    """
     k = (degree + 1) ** 2
     for source, line in ((q_i, lines[0]), (q_j, lines[1])):
         field[:k] = source[:k]
         turn_to_axis(degree, turns, tables, field, spare)
         gather_azimuthal(degree, field, line)
+    if close:
+        _multiply_both(degree, coupling, lines)
+    else:
+        _multiply(degree, coupling, lines)
+    for target, line in ((u_i, lines[2]), (u_j, lines[3])):
+        scatter_azimuthal(degree, line, field)
+        turn_from_axis(degree, turns, tables, field, spare)
+        target[:k] += field[:k]
+
+
+@njit(cache=True)
+def _multiply(degree, coupling, lines):
+    """Multiply moments of i and j, lines 0 and 1, by the coupling: velocities, lines 2 and 3."""
     from_i, from_j, at_i, at_j = lines
     begin = first = 0
     for total in range(degree + 2):
@@ -60,10 +78,25 @@ def _add_pair(degree, turns, coupling, tables, q_i, q_j, u_i, u_j, field, spare,
             at_i[first + row, 0], at_i[first + row, 1] = a, b
         begin += size * size
         first += size
-    for target, line in ((u_i, at_i), (u_j, at_j)):
-        scatter_azimuthal(degree, line, field)
-        turn_from_axis(degree, turns, tables, field, spare)
-        target[:k] += field[:k]
+
+
+@njit(cache=True)
+def _multiply_both(degree, coupling, lines):
+    """As `_multiply`, by the symmetric matrices of `effective_coupling`."""
+    begin = first = 0
+    for total in range(degree + 2):
+        size = block_size(degree, total)
+        for row in range(2 * size):
+            a = b = 0.0
+            for column in range(2 * size):
+                v = coupling[begin + row * 2 * size + column]
+                half, place = (0, column) if column < size else (1, column - size)
+                a += v * lines[half, first + place, 0]
+                b += v * lines[half, first + place, 1]
+            half, place = (2, row) if row < size else (3, row - size)
+            lines[half, first + place, 0], lines[half, first + place, 1] = a, b
+        begin += 4 * size * size
+        first += size
 
 
 @njit(cache=True)
@@ -78,16 +111,23 @@ def _respond(degree, response, incoming, out):
         out[row] += total
 
 
-@njit(cache=True)
-def couple_scene(centres, degrees, tables):
-    """Everything about a scene that the iterations need, from centres (n, 3) [radii].
+NO_CLOSE_PAIRS = np.zeros((0, 0), dtype=np.bool_), np.zeros(0)
+"""For `couple_scene`."""
 
-    degrees: (n, n) symmetric, of each pair. Returns the highest degree (n,) and the first harmonic
-    (n + 1,) of the spheres; for all pairs j < i, row by row, one after the other, `turns_to` their
+
+@njit(cache=True)
+def couple_scene(centres, radii, degrees, least, close_pairs, tables):
+    """Everything about a scene that the iterations need.
+
+    centres: (n, 3), radii: (n,), in one unit. degrees: (n, n) symmetric, of each pair. least:
+    degree that every sphere has at least. close_pairs: (n, n), which pairs j < i are close, or
+    (0, 0) where none is; and their effective couplings, row by row one after the other.
+    Returns radii, degrees, the highest degree (n,) and the first harmonic (n + 1,) of the spheres;
+    for all pairs j < i, row by row, one after the other, whether they are close, `turns_to` their
     directions and their couplings, and where those of each pair begin.
     """
     n = len(centres)
-    highest = np.zeros(n, dtype=np.int64)
+    highest = np.full(n, least)
     starts = np.zeros(n + 1, dtype=np.int64)
     for i in range(n):
         for j in range(n):
@@ -95,35 +135,45 @@ def couple_scene(centres, degrees, tables):
                 highest[i] = max(highest[i], degrees[i, j])
         starts[i + 1] = starts[i] + (highest[i] + 1) ** 2
     count = n * (n - 1) // 2
+    which, effective = close_pairs
+    close = np.zeros(count, dtype=np.bool_)
     begin, p = np.zeros((count + 1, 2), dtype=np.int64), 0
     for i in range(n):
         for j in range(i):
             degree = degrees[i, j]
+            close[p] = len(which) > 0 and which[i, j]
+            entries = (4 if close[p] else 1) * block_sizes(degree)[1] if degree > 0 else 9
             begin[p + 1, 0] = begin[p, 0] + (4 * (degree + 2) if degree > 0 else 0)
-            begin[p + 1, 1] = begin[p, 1] + (block_sizes(degree)[1] if degree > 0 else 9)
+            begin[p + 1, 1] = begin[p, 1] + entries
             p += 1
-    turns, couplings, p = np.empty(begin[count, 0]), np.empty(begin[count, 1]), 0
+    turns, couplings, p, taken = np.empty(begin[count, 0]), np.empty(begin[count, 1]), 0, 0
     for i in range(n):
         for j in range(i):
-            degree = degrees[i, j]
+            degree, both = degrees[i, j], (radii[i], radii[j])
             coupling = couplings[begin[p, 1] : begin[p + 1, 1]]
             if degree == 0:
-                put_coupling_of_forces(centres[i], centres[j], coupling)
+                put_coupling_of_forces(centres[i], centres[j], both, coupling)
             else:
                 apart = centres[i] - centres[j]
                 distance = np.sqrt(np.sum(apart**2))
                 turns[begin[p, 0] : begin[p + 1, 0]] = turns_to(degree, apart / distance).ravel()
-                coupling[:] = axial_coupling(degree, distance, tables)
+                if close[p]:
+                    coupling[:] = effective[taken : taken + len(coupling)]
+                    taken += len(coupling)
+                else:
+                    coupling[:] = axial_coupling(degree, distance, both, tables)
             p += 1
-    return highest, starts, turns, couplings, begin
+    return radii, degrees, highest, starts, close, turns, couplings, begin
 
 
 @njit(cache=True)
-def apply_system(moments, scene, degrees, response, tables, out):
-    """out = moments + T sum_j K_ij moments_j, for moments (total, 3) of a coupled scene."""
-    highest, starts, turns, couplings, begin = scene
+def incoming_flow(moments, scene, tables):
+    """sum_j K_ij a_j moments_j, (total, 3): what the others' tractions make on each sphere."""
+    radii, degrees, highest, starts, close, turns, couplings, begin = scene
     largest = (np.max(highest) + 1) ** 2
-    incoming = np.zeros(moments.shape)
+    incoming, whole = np.zeros(moments.shape), np.empty(moments.shape)
+    for i in range(len(highest)):
+        whole[starts[i] : starts[i + 1]] = radii[i] * moments[starts[i] : starts[i + 1]]
     field, spare = np.empty((largest, 3)), np.empty((largest, 3))
     lines = np.empty((4, 3 * largest, 2))
     p = 0
@@ -131,16 +181,17 @@ def apply_system(moments, scene, degrees, response, tables, out):
         for j in range(i):
             degree = degrees[i, j]
             if degree == 0:
-                _add_forces(couplings, begin[p, 1], moments, starts[i], starts[j], incoming)
+                _add_forces(couplings, begin[p, 1], whole, starts[i], starts[j], incoming)
             else:
                 own, other = (starts[i], starts[i + 1]), (starts[j], starts[j + 1])
                 _add_pair(
                     degree,
+                    close[p],
                     turns[begin[p, 0] : begin[p + 1, 0]].reshape(4, degree + 2),
                     couplings[begin[p, 1] : begin[p + 1, 1]],
                     tables,
-                    moments[own[0] : own[1]],
-                    moments[other[0] : other[1]],
+                    whole[own[0] : own[1]],
+                    whole[other[0] : other[1]],
                     incoming[own[0] : own[1]],
                     incoming[other[0] : other[1]],
                     field,
@@ -148,41 +199,74 @@ def apply_system(moments, scene, degrees, response, tables, out):
                     lines,
                 )
             p += 1
-    out[:] = moments
+    return incoming
+
+
+@njit(cache=True)
+def add_responses(flow, scene, response, out):
+    """out += T flow, sphere by sphere, for fields (total, 3) of a coupled scene."""
+    _, _, highest, starts, _, _, _, _ = scene
     for i in range(len(highest)):
-        u, q = incoming[starts[i] : starts[i + 1]], out[starts[i] : starts[i + 1]]
+        u, q = flow[starts[i] : starts[i + 1]], out[starts[i] : starts[i + 1]]
         _respond(highest[i], response, u, q)
 
 
 @njit(cache=True)
+def apply_system(moments, scene, response, tables, out):
+    """out = moments + T sum_j K_ij a_j moments_j, for moments (total, 3) of a coupled scene."""
+    out[:] = moments
+    add_responses(incoming_flow(moments, scene, tables), scene, response, out)
+
+
+@njit(cache=True)
+def solve_system(right, guess, scene, response, tables, tolerance, most):
+    """GMRES for the moments (total, 3) of a coupled scene.
+
+    right: (total, 3), not zero. guess: the same, where to start. most: largest number of
+    iterations. Returns moments, iterations and the residual, relative to `right`.
+    """
+    norm = np.linalg.norm(right)
+    missing = right
+    if np.any(guess):
+        image = np.empty(right.shape)
+        apply_system(guess, scene, response, tables, image)
+        missing = right - image
+    residual = np.linalg.norm(missing) / norm
+    if residual <= tolerance:
+        return guess, 0, residual
+    krylov, iterations = started(missing.ravel(), most), 0
+    basis = krylov[0]
+    while iterations < most and residual > tolerance:
+        old = basis[iterations].reshape(right.shape)
+        new = basis[iterations + 1].reshape(right.shape)
+        apply_system(old, scene, response, tables, new)
+        residual = extended(krylov, iterations) / norm
+        iterations += 1
+    return guess + combined(krylov, iterations).reshape(right.shape), iterations, residual
+
+
+@njit(cache=True)
 def solve_scene(centres, flow, degrees, response, tables, tolerance, most):
-    """GMRES for one scene; returns forces, iterations and relative residual.
+    """Fixed, equal spheres in a uniform flow; returns forces, iterations and relative residual.
 
     centres: (n, 3) [radii]. degrees: (n, n) symmetric degree of each pair. response: data, indices
     and row starts of T. most: largest number of iterations.
     Forces (n, 3) are in units of mu, flow and radius.
     """
     n = len(centres)
-    scene = couple_scene(centres, degrees, tables)
-    highest, starts = scene[0], scene[1]
+    none = (np.zeros((0, 0), dtype=np.bool_), np.zeros(0))
+    scene = couple_scene(centres, np.ones(n), degrees, 0, none, tables)
+    starts = scene[3]
     uniform, right = np.zeros((starts[n], 3)), np.zeros((starts[n], 3))
     for i in range(n):
         uniform[starts[i]] = np.sqrt(4.0 * np.pi) * flow
-        u, q = uniform[starts[i] : starts[i + 1]], right[starts[i] : starts[i + 1]]
-        _respond(highest[i], response, u, q)
-    iterations, residual = 0, 0.0
-    solution = right
+    add_responses(uniform, scene, response, right)
+    solution, iterations, residual = right, 0, 0.0
     if n > 1:
-        krylov = started(right.ravel(), most)
-        basis, norm = krylov[0], krylov[3][0]
-        residual = 1.0
-        while iterations < most and residual > tolerance:
-            old = basis[iterations].reshape(right.shape)
-            new = basis[iterations + 1].reshape(right.shape)
-            apply_system(old, scene, degrees, response, tables, new)
-            residual = extended(krylov, iterations) / norm
-            iterations += 1
-        solution = combined(krylov, iterations).reshape(right.shape)
+        guess = np.zeros(right.shape)
+        solution, iterations, residual = solve_system(
+            right, guess, scene, response, tables, tolerance, most
+        )
     forces = np.empty((n, 3))
     for i in range(n):
         forces[i] = np.sqrt(4.0 * np.pi) * solution[starts[i]]

@@ -1,11 +1,12 @@
 """The flow that a traction on one sphere makes on another, exactly, harmonic by harmonic.
 
-Lengths are in radii, mu = 1. Seen along the line of centres the coupling of two spheres does not
-mix azimuthal numbers: each total number M has its own small real matrix, which depends on the
-distance alone. With the potentials Phi_c of the traction's components f_c and Psi of y.f, the
-velocity is u_c = (Phi_c - x . d_c Phi + d_c Psi) / 8 pi, since G = I/r - (x - y) grad 1/r; the
-potentials are moved from one centre to the other as those of electrostatics are, and gradients
-and products with x act on solid harmonics by short recurrences.
+mu = 1, lengths are in radii of a sphere of diameter d_p; the spheres' own radii may differ.
+Moments are integrals of traction times a harmonic over a sphere. Seen along the line of centres the
+coupling of two spheres does not mix azimuthal numbers: each total number M has its own small real
+matrix, which depends on the distance alone. With the potentials Phi_c of the traction's components
+f_c and Psi of y.f, the velocity is u_c = (Phi_c - x . d_c Phi + d_c Psi) / 8 pi, since
+G = I/r - (x - y) grad 1/r; the potentials are moved from one centre to the other as those of
+electrostatics are, and gradients and products with x act on solid harmonics by short recurrences.
 
 Within the number M the z component has harmonics of order M, and the combinations
 (f_x +- i f_y) / sqrt 2 those of order M +- 1. Harmonics are Z_lm = N P_l^|m| exp(i m phi) without
@@ -23,8 +24,45 @@ from dustfall.stokes.harmonics import axes_swapped
 MOST_DEGREE = 40
 """Largest degree of the harmonics that a pair may exchange."""
 
-_COMPONENTS = (0, 1, -1)
+COMPONENTS = (0, 1, -1)
 """Azimuthal number that a component adds: z, (x + iy) / sqrt 2, (x - iy) / sqrt 2."""
+
+
+# How a solid harmonic of degree l and order m, |m| <= l, changes with a component c of d or of x:
+# d_c makes it one of degree l - 1; x_c of length 1 makes it two, of degrees l + 1 and l - 1.
+
+
+@njit(cache=True)
+def gradient(c, m, l):  # noqa: E741
+    """Factor of d_c of a regular solid harmonic."""
+    ratio = (2 * l + 1.0) / max(2 * l - 1.0, 1.0)
+    if c == 0:
+        return np.sqrt(ratio * (l - m) * (l + m))
+    if c == 1:
+        return (-1.0 if m >= 0 else 1.0) * np.sqrt(max(ratio * (l - m) * (l - m - 1), 0.0))
+    return (1.0 if m >= 1 else -1.0) * np.sqrt(max(ratio * (l + m) * (l + m - 1), 0.0))
+
+
+@njit(cache=True)
+def up(c, m, l):  # noqa: E741
+    """Factor of the part of degree l + 1 of a product with x_c."""
+    above = (2 * l + 1.0) * (2 * l + 3.0)
+    if c == 0:
+        return np.sqrt(((l + 1) ** 2 - m * m) / above)
+    if c == 1:
+        return (1.0 if m >= 0 else -1.0) * np.sqrt((l + m + 1) * (l + m + 2) / above)
+    return (-1.0 if m >= 1 else 1.0) * np.sqrt((l - m + 1) * (l - m + 2) / above)
+
+
+@njit(cache=True)
+def down(c, m, l):  # noqa: E741
+    """Factor of the part of degree l - 1 of a product with x_c."""
+    below = max(4.0 * l * l - 1.0, 1.0)
+    if c == 0:
+        return np.sqrt((l * l - m * m) / below)
+    if c == 1:
+        return (-1.0 if m >= 0 else 1.0) * np.sqrt(max((l - m) * (l - m - 1) / below, 0.0))
+    return (1.0 if m >= 1 else -1.0) * np.sqrt(max((l + m) * (l + m - 1) / below, 0.0))
 
 
 @cache
@@ -38,40 +76,16 @@ def translation_tables(degree: int = MOST_DEGREE):
     moved *= 4.0 * np.pi / (2 * of + 1)
 
     # Arrays [component, m + 2, l]: m starts at -2.
-    m = np.arange(-2, size)[:, None]
-    l = np.arange(size)[None, :]  # noqa: E741 - the field's letter
-    root = np.vectorize(lambda v: np.sqrt(max(v, 0.0)))
-    raised, lowered = np.where(m >= 0, -1.0, 1.0), np.where(m >= 1, -1.0, 1.0)
-    inside = np.abs(m) <= l
-    ratio = (2 * l + 1.0) / np.maximum(2 * l - 1.0, 1.0)
-    gradient = np.stack(
-        [
-            root(ratio * (l - m) * (l + m)),
-            raised * root(ratio * (l - m) * (l - m - 1)),
-            -lowered * root(ratio * (l + m) * (l + m - 1)),
-        ]
-    )
-    above, below = (2 * l + 1.0) * (2 * l + 3.0), np.maximum(4.0 * l * l - 1.0, 1.0)
-    up = np.stack(
-        [
-            root(((l + 1) ** 2 - m * m) / above),
-            -raised * root((l + m + 1) * (l + m + 2) / above),
-            lowered * root((l - m + 1) * (l - m + 2) / above),
-        ]
-    )
-    down = np.stack(
-        [
-            root((l * l - m * m) / below),
-            raised * root((l - m) * (l - m - 1) / below),
-            -lowered * root((l + m) * (l + m - 1) / below),
-        ]
-    )
+    recurrences = np.zeros((3, 3, size + 2, size))
+    for order in range(-2, size):
+        for n in range(abs(order), size):
+            for c in range(3):
+                for kind, of_component in enumerate((gradient, up, down)):
+                    recurrences[kind, c, order + 2, n] = of_component(c, order, n)
     swap = axes_swapped(degree)
     return (
         moved,
-        np.where(inside, gradient, 0.0),
-        np.where(inside, up, 0.0),
-        np.where(inside, down, 0.0),
+        *recurrences,
         swap.data,
         swap.indices.astype(np.int64),
         swap.indptr.astype(np.int64),
@@ -82,7 +96,7 @@ def translation_tables(degree: int = MOST_DEGREE):
 def block_size(degree, total):
     """Number of coefficients of the total azimuthal number M = `total`, 0 ... degree + 1."""
     size = 0
-    for step in _COMPONENTS:
+    for step in COMPONENTS:
         size += max(0, degree + 1 - abs(total + step))
     return size
 
@@ -98,31 +112,33 @@ def block_sizes(degree):
 
 
 @njit(cache=True)
-def put_coupling_of_forces(centre, other, out):
+def put_coupling_of_forces(centre, other, radii, out):
     """Write the coupling of the moments of degree 0 of two spheres, row by row: out (9,).
 
-    centre, other: (3,) [radii]. The Rotne-Prager tensor, which is exact for uniform tractions
-    (Rotne and Prager 1969), times 4 pi, since moments and velocities of degree 0 are over and
-    times the root of that.
+    centre, other: (3,), radii: of both. The Rotne-Prager tensor, which is exact for uniform
+    tractions (Rotne and Prager 1969, Zuk et al. 2014 for two radii), times 4 pi, since moments
+    and velocities of degree 0 are over and times the root of that.
     """
+    squares = radii[0] ** 2 + radii[1] ** 2
     square = 0.0
     for i in range(3):
         square += (centre[i] - other[i]) ** 2
     distance = np.sqrt(square)
-    along = (1.0 - 2.0 / square) / square
+    along = (1.0 - squares / square) / square
     for i in range(3):
         for j in range(3):
             value = along * (centre[i] - other[i]) * (centre[j] - other[j])
             if i == j:
-                value += 1.0 + 2.0 / (3.0 * square)
+                value += 1.0 + squares / (3.0 * square)
             out[3 * i + j] = value / (2.0 * distance)
 
 
 @njit(cache=True)
-def axial_coupling(degree, distance, tables):
+def axial_coupling(degree, distance, radii, tables):
     """Matrices of the numbers M = 0, 1, ... of a pair along z, row by row one after the other.
 
-    Rows: velocity on the sphere at (0, 0, distance); columns: traction on that at the origin.
+    Rows: velocity on the sphere at (0, 0, distance), whose radius is the first; columns: traction
+    on that at the origin.
     """
     moved, gradient, up, down, _, _, _ = tables
     sizes, entries = block_sizes(degree)
@@ -132,6 +148,11 @@ def axial_coupling(degree, distance, tables):
     powers[0] = 1.0
     for t in range(2 * length - 1):
         powers[t + 1] = powers[t] / distance
+    here, there = np.ones(length + 1), np.ones(length + 1)
+    for t in range(length):
+        here[t + 1] = here[t] * radii[0]
+        there[t + 1] = there[t] * radii[1]
+    reach = distance / radii[0]
     # Of the column's traction: potentials of its component and of y.f, and d_r of the former.
     phi, psi, slope = np.empty(length), np.empty(length), np.zeros(length)
     begin = 0
@@ -139,7 +160,7 @@ def axial_coupling(degree, distance, tables):
         size = sizes[total]
         column = 0
         for s in range(3):
-            m = total + _COMPONENTS[s]
+            m = total + COMPONENTS[s]
             # a.b = a_z b_z + (a_+ b_- + a_- b_+) in the scaled components: the partner of s.
             partner = (3 - s) % 3
             scale = 1.0 if s == 0 else np.sqrt(0.5)
@@ -147,15 +168,17 @@ def axial_coupling(degree, distance, tables):
                 above = scale * up[partner, m + 2, l]
                 below = scale * down[partner, m + 2, l] if l > 0 else 0.0
                 for t in range(length):
-                    phi[t] = moved[abs(m), t, l] * powers[l + t + 1]
-                    psi[t] = above * moved[total, t, l + 1] * powers[l + t + 2]
+                    grown = here[t] * there[l]
+                    phi[t] = moved[abs(m), t, l] * powers[l + t + 1] * grown
+                    psi[t] = above * moved[total, t, l + 1] * powers[l + t + 2] * there[2]
                     if l > 0:
                         psi[t] += below * moved[total, t, l - 1] * powers[l + t]
+                    psi[t] *= grown / radii[0]
                 row = 0
                 for r in range(3):
                     weight = 1.0 if r == 0 else np.sqrt(0.5)
-                    order = total + _COMPONENTS[r]
-                    mixed = m + _COMPONENTS[r]
+                    order = total + COMPONENTS[r]
+                    mixed = m + COMPONENTS[r]
                     for t in range(length - 1):
                         slope[t] = gradient[r, m + 2, t + 1] * phi[t + 1]
                     for t in range(abs(order), degree + 1):
@@ -164,7 +187,7 @@ def axial_coupling(degree, distance, tables):
                             times += up[partner, mixed + 2, t - 1] * slope[t - 1]
                         value = gradient[r, total + 2, t + 1] * psi[t + 1] - scale * times
                         if s == 0:
-                            value -= distance * slope[t]
+                            value -= reach * slope[t]
                         value *= weight
                         if r == s:
                             value += phi[t]

@@ -22,27 +22,30 @@ TABLES = translation_tables()
 RNG = np.random.default_rng(4)
 
 
-def coupled(degree, shift, at_i, at_j):
-    """Velocities on spheres i and j, i at `shift` from j [radii], by the tractions on the other."""
+def coupled(degree, shift, at_i, at_j, radii=(1.0, 1.0)):
+    """Velocities on spheres i and j, i at `shift` from j, by the tractions on the other."""
     distance = np.linalg.norm(shift)
     k = (degree + 1) ** 2
     u_i, u_j = np.zeros((k, 3)), np.zeros((k, 3))
-    _add_pair(
-        degree, turns_to(degree, shift / distance), axial_coupling(degree, distance, TABLES),
-        TABLES, at_i, at_j, u_i, u_j, np.empty((k, 3)), np.empty((k, 3)), np.empty((4, 3 * k, 2)),
-    )  # fmt: skip
+    turns = turns_to(degree, shift / distance)
+    coupling = axial_coupling(degree, distance, radii, TABLES)
+    field, spare, lines = np.empty((k, 3)), np.empty((k, 3)), np.empty((4, 3 * k, 2))
+    _add_pair(degree, False, turns, coupling, TABLES, at_i, at_j, u_i, u_j, field, spare, lines)
     return u_i, u_j
 
 
-def integrated(degree, shift, traction):
-    """Harmonics of the velocity on a sphere at `shift`, by quadrature on both spheres."""
+def integrated(degree, shift, traction, radii=(1.0, 1.0)):
+    """Harmonics of the velocity on a sphere at `shift`, by quadrature on both spheres.
+
+    radii: of that sphere and of the one that the traction is on, whose moments are given.
+    """
     points, weights = lebedev_rule(77)
     points = points.T
     harmonics = real_harmonics(degree, points)
     loads = weights[:, None] * (harmonics @ traction)
     velocity = np.empty((len(points), 3))
     for p, x in enumerate(points):
-        apart = shift + x - points
+        apart = shift + radii[0] * x - radii[1] * points
         r = np.linalg.norm(apart, axis=1)
         velocity[p] = loads.T @ (1.0 / r) + apart.T @ (np.sum(apart * loads, axis=1) / r**3)
     return harmonics.T @ (weights[:, None] * velocity) / (8.0 * np.pi)
@@ -58,6 +61,17 @@ def test_coupling_is_the_integral_over_both_spheres(degree, shift):
     u_i, u_j = coupled(degree, shift, *tractions)
     np.testing.assert_allclose(u_i, integrated(degree, shift, tractions[1]), atol=1e-13)
     np.testing.assert_allclose(u_j, integrated(degree, -shift, tractions[0]), atol=1e-13)
+
+
+@pytest.mark.parametrize("radii", [(0.5, 1.2), (1.5, 0.1)])
+@pytest.mark.parametrize("degree", [0, 1, 6])
+def test_coupling_of_unequal_spheres_is_the_integral_over_both(degree, radii):
+    shift = np.array([1.1, -1.7, 1.9])
+    tractions = RNG.normal(size=(2, (degree + 1) ** 2, 3))
+    u_i, u_j = coupled(degree, shift, *tractions, radii)
+    np.testing.assert_allclose(u_i, integrated(degree, shift, tractions[1], radii), atol=1e-13)
+    from_i = integrated(degree, -shift, tractions[0], radii[::-1])
+    np.testing.assert_allclose(u_j, from_i, atol=1e-13)
 
 
 @pytest.mark.parametrize("degree", [3, 20, 40])
@@ -120,7 +134,7 @@ def test_coupling_of_forces_is_that_of_degree_zero():
     forces = RNG.normal(size=(2, 1, 3))
     u_i, u_j = coupled(0, shift, *forces)
     tensor = np.empty(9)
-    put_coupling_of_forces(shift, np.zeros(3), tensor)
+    put_coupling_of_forces(shift, np.zeros(3), (1.0, 1.0), tensor)
     tensor = tensor.reshape(3, 3)
     np.testing.assert_allclose(tensor @ forces[1, 0], u_i[0], rtol=1e-13)
     np.testing.assert_allclose(tensor @ forces[0, 0], u_j[0], rtol=1e-13)
