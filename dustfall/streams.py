@@ -30,6 +30,7 @@ class Purpose(IntEnum):
     STRESS = 16  # test, number
     TRUNCATION = 17  # kind of cluster, number
     EXPORT = 18
+    BACK_FLOW = 19
 
 
 def stream(purpose: Purpose, seed: int, *items: int) -> np.random.Generator:

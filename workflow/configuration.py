@@ -243,23 +243,28 @@ def _check_physics(config: dict) -> None:
         f"studies.statistics_from is {studies['statistics_from']:g} response times, but must be at "
         f"most {latest:g}, so that {STEADY_STEPS} of the largest of studies.steps follow.",
     )
-    step, duration = settle["step"], settle["duration"]
+    _check_times("sedimentation", settle, "response")
+    _check_times("sedimentation.long", settle["long"], "spreading")
+
+
+def _check_times(section: str, times: dict, unit: str) -> None:
+    step, duration = times["step"], times["duration"]
     for key in ("duration", "save_every"):
-        _require_multiple(f"sedimentation.{key}", settle[key], "sedimentation.step", step)
-    latest = duration - max(settle["save_every"], STEADY_STEPS * step)
+        _require_multiple(f"{section}.{key}", times[key], f"{section}.step", step, unit)
+    latest = duration - max(times["save_every"], STEADY_STEPS * step)
     _require(
-        settle["statistics_from"] <= latest,
-        f"sedimentation.statistics_from is {settle['statistics_from']:g} response times, but must "
-        f"be at most {latest:g}, so that {STEADY_STEPS} steps and a frame follow within "
-        f"sedimentation.duration, which is {duration:g}.",
+        times["statistics_from"] <= latest,
+        f"{section}.statistics_from is {times['statistics_from']:g} {unit} times, but must be at "
+        f"most {latest:g}, so that {STEADY_STEPS} steps and a frame follow within "
+        f"{section}.duration, which is {duration:g}.",
     )
 
 
-def _require_multiple(key: str, value: float, of: str, step: float) -> None:
+def _require_multiple(key: str, value: float, of: str, step: float, unit: str = "response") -> None:
     steps = round(value / step)
     _require(
         steps >= 1 and abs(value - steps * step) <= 1e-9 * value,
-        f"{key} is {value:g} response times, but must be a multiple of {of}, which is {step:g}.",
+        f"{key} is {value:g} {unit} times, but must be a multiple of {of}, which is {step:g}.",
     )
 
 

@@ -8,9 +8,11 @@ from zlib import crc32
 
 from dustfall.forces.features import KINDS
 from dustfall.forces.registry import settling_models, trained_models
+from dustfall.sedimentation import AllParticles, Properties
 
-ALL_PARTICLES = "all_particles"
-"""What cases are called in which every particle feels all others, not its nearest neighbours."""
+ALL_PARTICLES, BACK_FLOW = AllParticles.name, "back_flow"
+"""What cases are called in which every particle feels all others, not its nearest neighbours, and
+those in which the fluid flows back between nearest neighbours."""
 
 
 class Case(NamedTuple):
@@ -21,7 +23,9 @@ class Case(NamedTuple):
     galileo_multiple: float
     seed: int = 1
     compared: str = ""
-    """Force model beside that of `sedimentation.model`, or ALL_PARTICLES."""
+    """Force model beside that of `sedimentation.model`, or the name of another closure."""
+    long: bool = False
+    """Whether it lasts as long as the cloud takes to become steady, and not as the paper's do."""
 
     @property
     def start(self) -> str:
@@ -37,8 +41,8 @@ class Case(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Name that the files of the case have: of the start, and of what is compared."""
-        return f"{self.start}_{self.compared}" if self.compared else self.start
+        """Name that the files of the case have: of the start, what is compared, and how long."""
+        return "_".join(filter(None, [self.start, self.compared, "long" if self.long else ""]))
 
 
 def shards(config: dict) -> list[str]:
@@ -163,36 +167,126 @@ def cases(config: dict) -> dict[str, Case]:
     """Every sedimentation case by its name; of the first seed all, then of the next one."""
     settle = config["sedimentation"]
     galileo = settle["galileo"]
+    long = settle["long"]
+    phis = settle["volume_fractions"]
+    # Of cases that are compared long ones say more, where there are any.
+    fewest, lasting = min(long["particles"] or settle["particles"]), bool(long["particles"])
     found = [
-        *(Case(n, phi, 1.0) for n in settle["particles"] for phi in settle["volume_fractions"]),
+        *(Case(n, phi, 1.0) for n in settle["particles"] for phi in phis),
         *(
             Case(galileo["particles"], galileo["volume_fraction"], multiple)
             for multiple in galileo["multiples"]
         ),
+        *(Case(n, phi, 1.0, long=True) for n in long["particles"] for phi in phis),
         *(
-            Case(min(settle["particles"]), phi, 1.0, compared=model)
-            for model in compared_models(config)
-            for phi in settle["volume_fractions"]
+            Case(fewest, phi, 1.0, compared=compared, long=lasting)
+            for compared in [*compared_models(config), *[BACK_FLOW] * settle["back_flow"]]
+            for phi in phis
         ),
         *(
             Case(n, phi, 1.0, compared=ALL_PARTICLES)
             for n in settle["all_particles"]["particles"]
-            for phi in settle["volume_fractions"]
+            for phi in phis
         ),
     ]
-    numbers = chain(settle["seeds"], repeat(settle["seeds"][-1]))
-    seeds = dict(zip(settle["particles"], numbers, strict=False))
+    seeds = _seeds(settle["particles"], settle["seeds"])
+    long_seeds = _seeds(long["particles"], long["seeds"])
     return {
         case.name: case
-        for seed in range(1, max(settle["seeds"]) + 1)
+        for seed in range(1, max([*settle["seeds"], *long["seeds"]]) + 1)
         for case in (one._replace(seed=seed) for one in found)
-        if seed <= seeds.get(case.particles, 1)
+        # Compared long cases have the first start only: they differ from each other by their paths.
+        if seed <= (seeds, {} if case.compared else long_seeds)[case.long].get(case.particles, 1)
     }
+
+
+def _seeds(particles: list[int], numbers: list[int]) -> dict[int, int]:
+    """Starts of each number of particles; the last number of starts is for those that follow."""
+    return dict(zip(particles, chain(numbers, repeat(numbers[-1])), strict=False))
+
+
+def settled_cases(config: dict) -> list[str]:
+    """Names of the cases that tell the steady state: the long ones, and others without a long one.
+
+    Those of other seeds count as the same case.
+    """
+    found = cases(config)
+    lasting = {case._replace(seed=1) for case in found.values() if case.long}
+    return [
+        name
+        for name, case in found.items()
+        if case.long or case._replace(seed=1, long=True) not in lasting
+    ]
+
+
+def is_plain(case: Case) -> bool:
+    """Whether a case has the campaign's model and properties, and their Galileo number."""
+    return case.galileo_multiple == 1 and not case.compared
+
+
+def largest_cases(config: dict, long: list[int]) -> list[str]:
+    """Names of the plain cases with most particles, one start each, from dilute to dense.
+
+    Of the long ones where `long` tells their numbers of particles, else of the others.
+    """
+    settle = config["sedimentation"]
+    most, phis = max(long or settle["particles"]), sorted(settle["volume_fractions"])
+    return [Case(most, phi, 1.0, long=bool(long)).name for phi in phis]
+
+
+def schedule(config: dict, case: str) -> dict[str, float]:
+    """Step, duration and time between frames of a case [tau]."""
+    one = cases(config)[case]
+    settle = config["sedimentation"]
+    if one.long:
+        return long_schedule(config, one.volume_fraction, one.galileo_multiple)
+    return {
+        "step": settle["step"],
+        "duration": settle["duration"],
+        "save_interval": settle["save_every"],
+    }
+
+
+def long_schedule(config: dict, volume_fraction: float, galileo_multiple=1.0) -> dict[str, float]:
+    """Step, duration and time between frames [tau] of a cloud that lasts until it is steady.
+
+    They are set in spreading times of the cloud, and written with three digits of the step.
+    """
+    long = config["sedimentation"]["long"]
+    unit = _properties(config, galileo_multiple).spreading_time(volume_fraction)
+    step = float(f"{long['step'] * unit:.3g}")
+    return {
+        "step": step,
+        "duration": step * round(long["duration"] / long["step"]),
+        "save_interval": step * round(long["save_every"] / long["step"]),
+    }
+
+
+def statistics_from(config: dict, case: str) -> float:
+    """Time [tau] from which a case is averaged."""
+    one = cases(config)[case]
+    settle = config["sedimentation"]
+    if not one.long:
+        return settle["statistics_from"]
+    return long_statistics_from(config, one.volume_fraction, one.galileo_multiple)
+
+
+def long_statistics_from(config: dict, volume_fraction: float, galileo_multiple=1.0) -> float:
+    """Time [tau] from which a cloud that lasts until it is steady is averaged."""
+    start = config["sedimentation"]["long"]["statistics_from"]
+    return start * _properties(config, galileo_multiple).spreading_time(volume_fraction)
+
+
+def _properties(config: dict, galileo_multiple: float) -> Properties:
+    settle = config["sedimentation"]
+    properties = Properties(**settle["properties"])
+    return properties.with_galileo_multiple(galileo_multiple, settle["galileo"]["change"])
 
 
 def force_model(config: dict, case: str) -> str:
     """Force model of a case among nearest neighbours."""
-    return cases(config)[case].compared or config["sedimentation"]["model"]
+    compared = cases(config)[case].compared
+    return config["sedimentation"]["model"] if compared in ("", BACK_FLOW) else compared
 
 
 def start_file(config: dict, case: str) -> str | list[str]:

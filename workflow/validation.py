@@ -21,13 +21,14 @@ import pandas as pd
 import yaml
 
 from dustfall.analysis.references import (
-    BATCHELOR_COEFFICIENT,
     PAPER_SCORES,
     PAPER_SETTLING,
 )
 from dustfall.benchmarks.solver import MULTIPOLE
-from dustfall.figures.style import ALL_PARTICLES, model_title
+from dustfall.figures.style import model_title
 from dustfall.scenes import LAWS
+from dustfall.sedimentation.closures import AllParticles
+from dustfall.sedimentation.closures.back_flow import BATCHELOR_COEFFICIENT
 from dustfall.sedimentation.properties import Properties
 from dustfall.sedimentation.state import box_length
 from dustfall.stokes import Status, fixed_spheres
@@ -347,8 +348,9 @@ def galileo(steady: pd.DataFrame, configuration: dict) -> pd.DataFrame:
 
 def models(steady: pd.DataFrame, configuration: dict) -> pd.DataFrame:
     """Settling velocity of every model in the smallest clouds: one row a phi and model."""
+    settle = configuration["sedimentation"]
     own = steady[
-        (steady["n"] == min(configuration["sedimentation"]["particles"]))
+        (steady["n"] == min(settle["long"]["particles"] or settle["particles"]))
         & (steady["quantity"] == "settling_velocity_mean")
     ]
     own = own.sort_values("galileo").drop_duplicates(["model", "volume_fraction"])
@@ -359,7 +361,7 @@ def models(steady: pd.DataFrame, configuration: dict) -> pd.DataFrame:
 
 def all_particles(steady: pd.DataFrame) -> pd.DataFrame:
     """Clouds of which all particles feel each other: one row a phi and number of particles."""
-    own = steady[steady["model"] == ALL_PARTICLES]
+    own = steady[steady["model"] == AllParticles.name]
     if own.empty:
         return own
     velocity = own[own["quantity"] == "settling_velocity_mean"]
@@ -481,7 +483,9 @@ def _cases(table: pd.DataFrame, model: str) -> pd.DataFrame:
 def _steady_columns(velocity: pd.DataFrame) -> pd.DataFrame:
     half = (velocity["high"] - velocity["low"]) / 2
     columns = ["model", "n", "volume_fraction", "galileo", "status", "value", "half", "end"]
-    return velocity.assign(half=half)[[*columns, "drift", "drift_error", "spacings", "runs"]]
+    return velocity.assign(half=half)[
+        [*columns, "drift", "drift_error", "window", "spacings", "runs"]
+    ]
 
 
 def _with_paper(table: pd.DataFrame, paper: pd.DataFrame) -> pd.DataFrame:

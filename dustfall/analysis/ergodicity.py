@@ -1,12 +1,12 @@
 """Time average against ensemble average of the settling velocity."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
-from dustfall.analysis.settling import case_of, settling_velocities
+from dustfall.analysis.settling import case_of, settling_velocities, with_starts
 
 
 def spread_of_time_averages(velocity) -> pd.DataFrame:
@@ -36,9 +36,9 @@ def spread_of_time_averages(velocity) -> pd.DataFrame:
 
 
 def ergodicity_table(
-    trajectories: Iterable[xr.Dataset], start: float, progress=None
+    trajectories: Iterable[xr.Dataset], starts: float | Sequence[float]
 ) -> pd.DataFrame:
-    """Tabulate the spread of time averages for each trajectory, from `start` [tau] on.
+    """Tabulate the spread of time averages for each trajectory, from its start [tau] on.
 
     Returns the columns model, n, volume_fraction, galileo, window [tau], spread, and ensemble_mean
     and ensemble_variance of the settling velocity [v_s, v_s^2]. A cloud whose particles all have
@@ -47,7 +47,7 @@ def ergodicity_table(
     Raises ValueError where no trajectory is left, or as `settling_velocities` does.
     """
     tables = []
-    for done, trajectory in enumerate(trajectories, start=1):
+    for trajectory, start in with_starts(trajectories, starts):
         velocity, interval = settling_velocities(trajectory, start)
         if velocity.var(axis=1).any():
             table = spread_of_time_averages(velocity)
@@ -57,8 +57,6 @@ def ergodicity_table(
                 "ensemble_variance": velocity.var(axis=1).mean(),
             }
             tables.append(table.assign(window=window, **case_of(trajectory), **moments))
-        if progress:
-            progress(done, done)
     if not tables:
         raise ValueError("there is no trajectory whose particles differ in velocity")
     columns = ["model", "n", "volume_fraction", "galileo", "window", "spread"]

@@ -5,8 +5,8 @@ import pandas as pd
 from scipy import stats
 from scipy.spatial import cKDTree
 
-from dustfall.analysis.references import BATCHELOR_COEFFICIENT
 from dustfall.forces.formulas import FORMULAS
+from dustfall.sedimentation.closures.back_flow import BATCHELOR_COEFFICIENT
 from dustfall.sedimentation.neighbours import nearest_neighbours
 from dustfall.sedimentation.start import random_positions
 from dustfall.sedimentation.state import box_length

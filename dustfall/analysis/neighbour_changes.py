@@ -1,22 +1,22 @@
 """How often the nearest neighbours change."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
-from dustfall.analysis.settling import CASE, case_of, from_time, steadiness
+from dustfall.analysis.settling import CASE, case_of, from_time, steadiness, with_starts
 from dustfall.analysis.time_averages import mean_of_runs, mean_with_interval
 
 
-def neighbour_changes(runs: Iterable[xr.Dataset], start: float) -> pd.DataFrame:
-    """Tabulate the share of particles that get a new neighbour in a step, from `start` [tau] on.
+def neighbour_changes(runs: Iterable[xr.Dataset], starts: float | Sequence[float]) -> pd.DataFrame:
+    """Tabulate the share of particles that get a new neighbour in a step.
 
     Parameters: `runs`, series datasets with new_neighbours (step), the share of particles whose set
     of neighbours is another than a step ago, only_farthest (step), the share of these in which only
     the farthest changed, and mean and variance of the settling velocity; attributes step [tau] and
-    those of `settling.steady_state`.
+    those of `settling.steady_state`; `starts` of the windows [tau], as there.
 
     Returns the columns model, n, volume_fraction, galileo, step, status (`settling.steadiness`: in
     a case that is not steady the share still changes), share, low, high (95 % interval of
@@ -26,11 +26,9 @@ def neighbour_changes(runs: Iterable[xr.Dataset], start: float) -> pd.DataFrame:
     Raises ValueError where there is no run or nothing is left after `start`.
     """
     cases: dict[tuple, list[xr.Dataset]] = {}
-    for run in runs:
+    for run, start in with_starts(runs, starts):
         key = (*case_of(run).values(), float(run.attrs["step"]))
         cases.setdefault(key, []).append(from_time(run, start, "step"))
-    if not cases:
-        raise ValueError("there are no runs: at least one series is needed")
     rows = []
     for (*case, step), windows in sorted(cases.items()):
         mean = mean_of_runs([mean_with_interval(w["new_neighbours"].values) for w in windows])

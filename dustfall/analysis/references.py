@@ -39,9 +39,6 @@ units of the Stokes velocity, and the variance of V/mean(V) over k theta^2 = 0.2
 state. They are drawn by hand: numbers of four digits are data, round ones are where arrows end, and
 bound the value (`relation`). Below 1e-5 there are labels and arrows, and no point with a source."""
 
-BATCHELOR_COEFFICIENT = -6.55
-"""Settling velocity of a dilute random suspension is 1 + this times phi (Batchelor 1972)."""
-
 DEL_BELLO = {"volume_fraction": 1e-3, "low": 1.0, "high": 4.0}
 """Range, and no points, as these are not published. Volcanic ash (125 to 500 micrometres) in air,
 in the laboratory and in two- and four-way coupled simulations, phi = 1e-7 to 1e-3: particles that

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from dustfall.analysis.references import BATCHELOR_COEFFICIENT, DEL_BELLO, PAPER_SETTLING
+from dustfall.analysis.references import DEL_BELLO, PAPER_SETTLING
 from dustfall.analysis.time_averages import (
     ROUNDING,
     Mean,
@@ -16,7 +16,8 @@ from dustfall.analysis.time_averages import (
     mean_of_runs,
     mean_with_interval,
 )
-from dustfall.units import SPHERE_VOLUME
+from dustfall.sedimentation.closures.back_flow import BATCHELOR_COEFFICIENT
+from dustfall.sedimentation.properties import mean_spacing
 
 CASE = ("model", "n", "volume_fraction", "galileo")
 """Attributes that tell one case from another; runs that share them differ by their seed."""
@@ -37,9 +38,10 @@ AVERAGES = ("value", "low", "high", "standard_error", "degrees_of_freedom")
 DRIFT_LEVEL = 0.05
 """Probability that a steady case is taken for a drifting one, over both series that are tested."""
 
-SHORTEST_WINDOW = 1.0
-"""Mean spacings that particles must move relative to the cloud within a window: before that most
-keep the neighbours of their random start, and a mean that does not drift is that of the start."""
+SHORTEST_WINDOW = 5.0
+"""Mean spacings that particles must move through the cloud within a window: from a random start
+mean and variance rise over the first ten or so, and a window of fewer cannot tell a slow rise from
+a fluctuation, or shows the start itself."""
 
 
 def case_of(dataset: xr.Dataset) -> dict:
@@ -53,6 +55,22 @@ def case_of(dataset: xr.Dataset) -> dict:
         "volume_fraction": float(dataset.attrs["volume_fraction"]),
         "galileo": float(dataset.attrs["galileo"]),
     }
+
+
+def with_starts(
+    runs: Iterable[xr.Dataset], starts: float | Sequence[float]
+) -> list[tuple[xr.Dataset, float]]:
+    """Each run with the start of its window [tau]; one start may be that of all.
+
+    Raises ValueError for no run, or another number of starts than of runs.
+    """
+    runs = list(runs)
+    if not runs:
+        raise ValueError("there are no runs: at least one is needed")
+    each = [float(starts)] * len(runs) if isinstance(starts, int | float) else list(starts)
+    if len(each) != len(runs):
+        raise ValueError(f"there are {len(each)} starts of windows for {len(runs)} runs")
+    return list(zip(runs, each, strict=True))
 
 
 def from_time(dataset: xr.Dataset, start: float, dimension: str) -> xr.Dataset:
@@ -95,6 +113,8 @@ def stokes_number(run: xr.Dataset) -> float:
 def steadiness(windows: Sequence[xr.Dataset]) -> tuple[str, float]:
     """Whether the runs of a case are steady: their averaging windows, series datasets, tell.
 
+    One test for all cases, whatever their closure and duration.
+
     Returns `STEADY`, `DRIFTING` or `TOO_SHORT`, and how many mean spacings of the cloud a particle
     of one standard deviation in velocity moves through it within the window. With fewer than
     `SHORTEST_WINDOW` it is too short, whatever the series look like: time in a dilute cloud is
@@ -105,7 +125,7 @@ def steadiness(windows: Sequence[xr.Dataset]) -> tuple[str, float]:
     variance = np.mean([float(window["settling_velocity_variance"].mean()) for window in windows])
     mean = np.mean([float(window["settling_velocity_mean"].mean()) for window in windows])
     spread = np.sqrt(max(float(variance), 0.0))
-    spacing = np.cbrt(SPHERE_VOLUME / case_of(windows[0])["volume_fraction"])
+    spacing = mean_spacing(case_of(windows[0])["volume_fraction"])
     duration = np.mean([np.ptp(window["time"].values) for window in windows])
     moved = float(spread * stokes_number(windows[0]) * duration / spacing)
     if spread <= ROUNDING * abs(mean):
@@ -120,15 +140,16 @@ def steadiness(windows: Sequence[xr.Dataset]) -> tuple[str, float]:
 
 def steady_state(
     runs: Iterable[xr.Dataset],
-    start: float,
+    starts: float | Sequence[float],
     quantities: Sequence[str] = ("settling_velocity_mean",),
     confidence=0.95,
 ) -> pd.DataFrame:
-    """Average series quantities from `start` on, with confidence intervals, for each steady case.
+    """Average series quantities over a window, with confidence intervals, for each steady case.
 
     Parameters: `runs`, series datasets (dimension step; variables time [tau], the mean and
     variance of the settling velocity, and `quantities`; attributes model, n, volume_fraction,
-    galileo, stokes_number), `start` [tau]. Runs of one case that differ by seed are combined: from
+    galileo, stokes_number), `starts` of their windows [tau], one for each run or one for all. Runs
+    of one case that differ by seed are combined: from
     three on by the spread between them, below that by the error within each (`mean_of_runs`).
     Within a run it comes from batch means (`mean_with_interval`). A dilute cloud keeps its random
     start for the whole run, though, and time tells nothing of how another start would settle; so
@@ -138,25 +159,25 @@ def steady_state(
     Returns the columns model, n, volume_fraction, galileo, quantity, status (`steadiness`), value,
     low, high, standard_error, degrees_of_freedom, correlation_time [tau], first (at the first
     step of the runs, before the particles move), end and drift (of the line fitted to the window:
-    its last value, and its change over the window), drift_error (standard error), spacings (moved
-    within the window), runs; sorted by quantity and case. A case that is not steady has no
-    average: value, low, high, standard_error and degrees_of_freedom are NaN.
+    its last value, and its change over the window), drift_error (standard error), window (its
+    length [tau]), spacings (moved within it), runs; sorted by quantity and case. A case that is
+    not steady has no average: value, low, high, standard_error and degrees_of_freedom are NaN.
 
     Raises ValueError where a series lacks the first quantity, an attribute, or ten steps after
     `start`.
     """
-    cases: dict[tuple, list[xr.Dataset]] = {}
-    for run in runs:
+    cases: dict[tuple, list[tuple[xr.Dataset, xr.Dataset]]] = {}
+    for run, start in with_starts(runs, starts):
         if quantities[0] not in run:
             raise ValueError(
                 f"the series has no variable {quantities[0]!r}; it has {sorted(map(str, run))}"
             )
-        cases.setdefault(tuple(case_of(run).values()), []).append(run)
-    if not cases:
-        raise ValueError("there are no runs: at least one series is needed")
+        cases.setdefault(tuple(case_of(run).values()), []).append(
+            (run, from_time(run, start, "step"))
+        )
     rows = []
-    for case, own in sorted(cases.items()):
-        windows = [from_time(run, start, "step") for run in own]
+    for case, pairs in sorted(cases.items()):
+        own, windows = map(list, zip(*pairs, strict=True))
         status, spacings = steadiness(windows)
         # What only some closures measure has rows for their cases alone.
         for quantity in (name for name in quantities if all(name in run for run in own)):
@@ -188,6 +209,7 @@ def steady_state(
                     "end": trend.end,
                     "drift": trend.change,
                     "drift_error": trend.standard_error,
+                    "window": float(np.mean([np.ptp(w["time"].values) for w in windows])),
                     "spacings": spacings,
                     "runs": len(own),
                 }
@@ -255,8 +277,9 @@ def settling_in_time(runs: Iterable[xr.Dataset], points=500) -> pd.DataFrame:
     first and last among them). Of each (model, n, phi) the runs of the lowest Galileo number are
     kept, and of these the one of the lowest random stream.
 
-    Returns the columns model, n, volume_fraction, galileo, seed, time [tau], mean [v_s],
-    variance [v_s^2]. Raises ValueError where there is no run or an attribute is missing.
+    Returns the columns model, n, volume_fraction, galileo, seed, time [tau], spreading_times (the
+    same in units of `Properties.spreading_time`), mean [v_s], variance [v_s^2]. Raises ValueError
+    where there is no run or an attribute is missing.
     """
     chosen: dict[tuple, tuple] = {}
     for run in runs:
@@ -272,8 +295,10 @@ def settling_in_time(runs: Iterable[xr.Dataset], points=500) -> pd.DataFrame:
         steps = run.sizes["step"]
         kept = np.unique(np.linspace(0, steps - 1, min(points, steps)).round().astype(int))
         part = run.isel(step=kept)
+        unit = mean_spacing(key[2]) ** 2 / stokes_number(run)
         columns = {
             "time": part["time"].values,
+            "spreading_times": part["time"].values / unit,
             "mean": part["settling_velocity_mean"].values,
             "variance": part["settling_velocity_variance"].values,
         }

@@ -1,5 +1,6 @@
 """Spectra of velocity fluctuations in time, turned into wavenumber, and their slope."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from dustfall.analysis.settling import (
     from_time,
     settling_velocities,
     stokes_number,
+    with_starts,
 )
 from dustfall.analysis.time_averages import ROUNDING
 
@@ -207,12 +209,16 @@ def phase_and_spectra(
 
 
 def cloud_spectra(
-    trajectories: list[xr.Dataset], start: float, fit_frequencies=(0.0, np.inf), progress=None
+    trajectories: list[xr.Dataset],
+    starts: float | Sequence[float],
+    fit_frequencies=(0.0, np.inf),
+    progress=None,
 ) -> pd.DataFrame:
     """Tabulate the energy spectrum of the settling velocity, averaged over all particles.
 
     Parameters: `trajectories` (velocities (frame, atom, spatial) [v_s], coordinates, cell_lengths;
-    attribute stokes_number), `start` and `fit_frequencies` as in `phase_and_spectra`, `progress`.
+    attribute stokes_number), `starts` of their statistics [tau], `fit_frequencies` as in
+    `phase_and_spectra`, `progress`.
     kappa = 2 pi f / mean v with the mean over the cloud. The spectrum comes by both methods: the
     plain periodogram of the paper, and Welch's with its Hann window.
 
@@ -226,7 +232,7 @@ def cloud_spectra(
     Raises ValueError for no trajectory, uneven frames or fewer than four after `start`.
     """
     tables = []
-    for done, trajectory in enumerate(trajectories, start=1):
+    for done, (trajectory, start) in enumerate(with_starts(trajectories, starts), start=1):
         velocity, interval = settling_velocities(trajectory, start)
         if np.ptp(velocity, axis=0).max() > ROUNDING * abs(velocity.mean()):
             speed = velocity.mean() * stokes_number(trajectory)

@@ -13,7 +13,7 @@ from dustfall.analysis.references import (
     PAPER_SETTLING,
     POISSON_VORONOI_VARIANCE,
 )
-from dustfall.analysis.settling import CASE, STEADY, case_of, from_time
+from dustfall.analysis.settling import CASE, STEADY, case_of
 from dustfall.analysis.time_averages import correlation_length
 from dustfall.extras import extra
 from dustfall.sedimentation.start import random_positions
@@ -97,12 +97,12 @@ def cell_volumes(trajectory: xr.Dataset, start=0.0, snapshots=50, progress=None)
     return xr.Dataset(data, attrs=trajectory.attrs)
 
 
-def pooled_volumes(runs, start: float) -> np.ndarray:
-    """Normalised volumes (k, n times runs) from `start` [tau] on, of runs that differ by seed.
+def pooled_volumes(runs, frames=slice(1, None)) -> np.ndarray:
+    """Normalised volumes (k, n times runs) of some frames, of runs that differ by seed.
 
-    `runs` as `cell_volumes` returns them.
+    `runs` as `cell_volumes` returns them, whose first frame is the start.
     """
-    volumes = [from_time(run, start, "frame")["volume"].values for run in runs]
+    volumes = [run["volume"].values[frames] for run in runs]
     shortest = min(map(len, volumes))
     return np.concatenate([v[-shortest:] for v in volumes], axis=1)
 
@@ -212,25 +212,24 @@ def _interval(by_snapshot, by_particle, seed, length, correlated=1.0):
     return np.fmin(low, mean - half), np.fmax(high, mean + half)
 
 
-def voronoi_pdf_table(cells: Iterable[xr.Dataset], start: float, seed: int) -> pd.DataFrame:
+def voronoi_pdf_table(cells: Iterable[xr.Dataset], seed: int) -> pd.DataFrame:
     """Tabulate the p.d.f. of normalised Voronoï volumes for each Galileo number.
 
     Parameters: `cells` as `cell_volumes` returns them, of one volume fraction, one or, with several
-    seeds, more for each Galileo number; `start` of the averaging window [tau]; `seed`.
+    seeds, more for each Galileo number; `seed` of the bootstrap.
 
     Returns the columns source, galileo_multiple, volume, density, low, high. Sources: "settling"
-    (from `start` on, one curve a Galileo number, as a multiple of the lowest), "random start"
+    (over the window, one curve a Galileo number, as a multiple of the lowest), "random start"
     (first frames at the lowest), "gamma, k = 5, theta = 0.2" and "gamma, k = 5.59".
 
-    Raises ValueError where there are no cells, no frame after `start` or an attribute missing.
+    Raises ValueError where there are no cells or an attribute is missing.
     """
     by_galileo = {case[-1]: runs for case, runs in sorted(_cases(cells).items())}
     lowest = min(by_galileo)
-    first = [run.isel(frame=[0]) for run in by_galileo[lowest]]
-    initial = volume_distribution(pooled_volumes(first, 0.0), seed)
+    initial = volume_distribution(pooled_volumes(by_galileo[lowest], slice(1)), seed)
     tables = [initial.assign(source="random start")]
     for galileo, runs in by_galileo.items():
-        volumes = pooled_volumes(runs, start)
+        volumes = pooled_volumes(runs)
         tables.append(
             volume_distribution(volumes, seed).assign(
                 source="settling", galileo_multiple=round(galileo / lowest, 6)
@@ -261,14 +260,13 @@ def voronoi_variance_table(
     cells: Iterable[xr.Dataset],
     steady: pd.DataFrame,
     spheres: pd.DataFrame,
-    start: float,
     seed: int,
 ) -> pd.DataFrame:
     """Tabulate the variance of normalised Voronoï volumes against the settling velocity.
 
     Parameters: `cells` as `cell_volumes` returns them, `steady` as `steady_state` returns it for
     the settling velocity of the same cases, `spheres` as `random_sphere_table` for their volume
-    fractions, `start` of the averaging window [tau], `seed` of the bootstrap.
+    fractions, `seed` of the bootstrap.
 
     Returns the columns source, model, n, volume_fraction, galileo, status, variance, low, high (all
     over k theta^2 = 0.2 of the paper's gamma law), inverse_beta, inverse_beta_low,
@@ -290,8 +288,7 @@ def voronoi_variance_table(
             raise ValueError(f"the table of steady states has no row for {case}")
         row = steady[same].iloc[0]
         settled = row["status"] == STEADY
-        since = start if settled else min(float(run["time"].max()) for run in runs)
-        found = volume_variance(pooled_volumes(runs, since), seed)
+        found = volume_variance(pooled_volumes(runs, slice(1 if settled else -1, None)), seed)
         rows.append(
             {"source": "simulation", "status": row["status"]}
             | case

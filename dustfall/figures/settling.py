@@ -39,6 +39,10 @@ OBLIQUE = (0.45, 0.035)
 ADAPTED = 10.0
 """Time [tau] after which the start at rest is forgotten (exp(-10) of it is left)."""
 
+WINDOWS = ("as the paper", "until steady")
+"""How long runs last: as many response times as the paper's, or as many spreading times as it
+takes."""
+
 ROOM = 0.06
 """Share of an axis that is left free beyond the numbers drawn."""
 
@@ -192,46 +196,51 @@ def _ash(ax, frame):
 
 @styled
 def settling_in_time(frame: pd.DataFrame) -> Figure:
-    """Mean over particles of the settling velocity in time, its later drift, and the variance.
+    """Mean over particles of the settling velocity in time, its later change, and the variance.
 
-    `frame`: model, n, volume_fraction, time, mean, variance, as
-    `analysis.settling.settling_in_time` gives for one model; one column of panels for each n. The
-    drift is the change of the mean since `ADAPTED` (in a shorter run since half of it). Raises
-    ValueError for a missing column, several models or fewer than two rows.
+    `frame`: model, n, volume_fraction, time, spreading_times, mean, variance, as
+    `analysis.settling.settling_in_time` gives for one model, and window ("as the paper" or "until
+    steady"); one column of panels for each window and n, the first in response times, the second
+    in spreading times. The change is that of the mean since `ADAPTED`, in a shorter run since half
+    of it, in the second window since the first step. Raises ValueError for a missing column,
+    several models or fewer than two rows.
     """
-    columns = ["model", "n", "volume_fraction", "time", "mean", "variance"]
-    require(frame, columns, "settling_in_time", fewest=2)
+    columns = ["model", "n", "volume_fraction", "time", "spreading_times", "mean", "variance"]
+    require(frame, [*columns, "window"], "settling_in_time", fewest=2)
     if frame["model"].nunique() > 1:
         raise ValueError(
             f"settling_in_time draws one model, not {frame['model'].unique().tolist()}"
         )
-    numbers = sorted(frame["n"].unique())
-    figure = new_figure(DOUBLE if len(numbers) > 1 else 1.3 * SINGLE, 6.0)
-    axes = figure.subplots(3, len(numbers), squeeze=False, sharex=True, sharey="row")
-    since = min(ADAPTED, frame["time"].max() / 2)
-    for column, n in enumerate(numbers):
-        mean, drift, variance = axes[:, column]
-        for phi, rows in frame[frame["n"] == n].groupby("volume_fraction"):
+    panels = sorted(frame.groupby(["window", "n"]), key=lambda panel: panel[0])
+    figure = new_figure(DOUBLE if len(panels) > 1 else 1.3 * SINGLE, 6.0)
+    axes = figure.subplots(3, len(panels), squeeze=False, sharex="col", sharey="row")
+    for column, ((window, n), cases) in enumerate(panels):
+        mean, change, variance = axes[:, column]
+        paper = window == WINDOWS[0]
+        clock = "time" if paper else "spreading_times"
+        since = min(ADAPTED, cases["time"].max() / 2) if paper else 0.0
+        for phi, rows in cases.groupby("volume_fraction"):
             rows = rows.sort_values("time")
             colour = phi_colour(phi)
-            mean.plot(rows["time"], rows["mean"], color=colour, lw=1)
-            later = rows[rows["time"] >= since]
+            mean.plot(rows[clock], rows["mean"], color=colour, lw=1)
+            # A start at rest has not settled yet.
+            later = rows[(rows[clock] >= since) & (rows["mean"] > 0)]
             if not later.empty:
-                change = 100 * (later["mean"] / later["mean"].iloc[0] - 1)
-                drift.plot(later["time"], change, color=colour, lw=1)
-            # A start at rest has no variance, and a logarithmic axis no zero.
+                gained = 100 * (later["mean"] / later["mean"].iloc[0] - 1)
+                change.plot(later[clock], gained, color=colour, lw=1)
+            # It has no variance either, and a logarithmic axis no zero.
             positive = rows["variance"].where(rows["variance"] > 0)
-            variance.plot(rows["time"], positive, color=colour, lw=1)
+            variance.plot(rows[clock], positive, color=colour, lw=1)
         mean.axhline(1, color=REFERENCE, lw=0.6, zorder=0)
-        drift.axhline(0, color=REFERENCE, lw=0.6, zorder=0)
-        mean.set_title(number_label(n))
+        change.axhline(0, color=REFERENCE, lw=0.6, zorder=0)
+        mean.set_title(f"{number_label(n)}, {window}", fontsize=8)
         log_scale(variance, "y")
-        variance.set_xlabel(r"time $t/\tau$")
+        variance.set_xlabel(r"time $t/\tau$" if paper else "time [spreading times]")
     positive = frame["variance"][frame["variance"] > 0]
     if not positive.empty:
         axes[2, 0].set_ylim(0.5 * positive.quantile(0.01), 2 * positive.max())
     axes[0, 0].set_ylabel(r"mean $\langle v_s\rangle^{p} / v_{s,\mathrm{Stokes}}$")
-    axes[1, 0].set_ylabel(f"change of the mean\nsince ${since:g}\\,\\tau$ [%]")
+    axes[1, 0].set_ylabel(f"change of the mean [%]\n(since ${ADAPTED:g}\\,\\tau$; first step)")
     axes[2, 0].set_ylabel(r"variance $\mathrm{var}^{p}(v_s) / v_{s,\mathrm{Stokes}}^2$")
     letter(axes[:, 0])
     phi_legend(figure, frame["volume_fraction"])

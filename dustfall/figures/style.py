@@ -14,6 +14,7 @@ from matplotlib.ticker import FuncFormatter
 from dustfall.files import atomic
 from dustfall.forces import registry
 from dustfall.forces.formulas import FORMULAS
+from dustfall.sedimentation.closures import AllParticles, BackFlow
 
 STYLE: dict = {
     "font.family": "STIXGeneral",
@@ -95,14 +96,17 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
-ALL_PARTICLES = "all_particles"
-"""What the closure of all particles has in place of a force model."""
+CLOSURES = {
+    AllParticles.name: ("all particles together", {"color": "black", "marker": MARKERS[-1]}),
+    BackFlow.name: ("nearest neighbours and back-flow", {"color": "#aa4499", "marker": "h"}),
+}
+"""Title and look of what stands in place of a force model where a closure is compared."""
 
 
 def model_title(model: str) -> str:
     """What a force model is called in a figure: its title, without one its name as it is."""
-    if model == ALL_PARTICLES:
-        return "all particles together"
+    if model in CLOSURES:
+        return CLOSURES[model][0]
     return registry.title(model) if model in registry.FORCE_MODELS else model
 
 
@@ -114,8 +118,8 @@ def model_look(model: str) -> dict:
     """
     first = [*FORMULAS, *registry.trained_models()]
     known = first + [name for name in registry.FORCE_MODELS if name not in first]
-    if model == ALL_PARTICLES:
-        return {"color": "black", "marker": MARKERS[-1]}
+    if model in CLOSURES:
+        return CLOSURES[model][1]
     if model not in known:
         return {"color": REFERENCE, "marker": MARKERS[0]}
     number = known.index(model)

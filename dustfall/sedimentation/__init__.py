@@ -1,6 +1,6 @@
 """Sedimentation of monodisperse spheres in a periodic cube of fluid at rest."""
 
-from dustfall.sedimentation.closures import AllParticles, NearestNeighbours
+from dustfall.sedimentation.closures import AllParticles, BackFlow, NearestNeighbours
 from dustfall.sedimentation.neighbours import nearest_neighbours
 from dustfall.sedimentation.properties import Properties
 from dustfall.sedimentation.settle import Checkpoint, Output, Schedule, settle
@@ -9,6 +9,7 @@ from dustfall.sedimentation.state import Closure, Drag, State, box_length, move,
 
 __all__ = [
     "AllParticles",
+    "BackFlow",
     "Checkpoint",
     "Closure",
     "Drag",

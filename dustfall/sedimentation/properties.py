@@ -2,7 +2,9 @@
 
 import warnings
 from dataclasses import dataclass, fields, replace
-from math import isfinite
+from math import cbrt, isfinite
+
+from dustfall.units import SPHERE_VOLUME
 
 MOST_GALILEO = 1.0
 """Largest Galileo number that is settled with Stokes drag. It is the Reynolds number that Stokes'
@@ -89,6 +91,16 @@ class Properties:
                 stacklevel=2,
             )
 
+    def spreading_time(self, volume_fraction: float) -> float:
+        """Time [tau] in which a random cloud forgets who was next to whom: l^2 d_p / (v_s tau).
+
+        l is the mean spacing in d_p, and a Stokeslet at that distance moves a sphere by the
+        order of v_s / l: at this velocity l takes so long. With five neighbours the spread of the
+        velocities in a random cloud is 1.1 v_s / l, from phi = 1e-8 to 1e-3.
+        """
+        spacing = mean_spacing(volume_fraction)
+        return spacing**2 / self.stokes_number
+
     def with_galileo_multiple(self, multiple: float, change: str = "gravity") -> "Properties":
         """The same suspension at `multiple` times its Galileo number, by changing one property.
 
@@ -112,3 +124,8 @@ class Properties:
         if change not in changed:
             raise ValueError(f"change is {change!r}: allowed are {', '.join(changed)}")
         return replace(self, **{change: changed[change]})
+
+
+def mean_spacing(volume_fraction: float) -> float:
+    """Side of the cube [d_p] that a particle has to itself: n^(-1/3) of the number density n."""
+    return cbrt(SPHERE_VOLUME / volume_fraction)

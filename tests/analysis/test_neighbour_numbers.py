@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 
 from dustfall.analysis.neighbour_numbers import neighbour_numbers_table
+from dustfall.analysis.settling import STEADY, TOO_SHORT
 
 
 def run(neighbours, phi, mean):
@@ -13,10 +14,14 @@ def run(neighbours, phi, mean):
     # Before the window the cloud is elsewhere.
     velocity = np.where(time < 30, 0.0, mean) + 1e-3 * noise
     return xr.Dataset(
-        {"time": ("step", time), "settling_velocity_mean": ("step", velocity)},
+        {
+            "time": ("step", time),
+            "settling_velocity_mean": ("step", velocity),
+            "settling_velocity_variance": ("step", 0.04 + 1e-4 * noise),
+        },
         attrs={
             "model": "rotne_prager", "n": 1000, "volume_fraction": phi, "galileo": 0.078,
-            "neighbours": neighbours,
+            "neighbours": neighbours, "stokes_number": 9.0,
         },
     )  # fmt: skip
 
@@ -30,8 +35,20 @@ def test_the_window_alone_is_averaged_and_the_paper_has_its_relation():
     assert (table["half"] < 1e-3).all()
     assert table["relation"].tolist() == ["", "=", ">=", ">="]
     assert np.isnan(table["paper"][0])
+    # 0.2 v_s times 9 d_p/tau over 30 tau are 54 d_p: 6.7 spacings at 1e-3, and 0.3 at 1e-7.
+    assert table["status"].tolist()[0] == TOO_SHORT
+    assert table["status"].tolist()[2] == STEADY
+
+
+def test_each_run_may_have_a_start_of_its_own():
+    runs = [run(5, 1e-3, 1.49), run(4, 1e-3, 1.42)]
+    both = neighbour_numbers_table(runs, [0.0, 30.0]).set_index("neighbours")["value"]
+    assert both[5] == pytest.approx(1.49 / 2, rel=0.01)
+    assert both[4] == pytest.approx(1.42, rel=0.01)
+    with pytest.raises(ValueError, match="1 starts of windows for 2 runs"):
+        neighbour_numbers_table(runs, [30.0])
 
 
 def test_no_runs_are_refused():
-    with pytest.raises(ValueError, match="at least one series"):
+    with pytest.raises(ValueError, match="at least one is needed"):
         neighbour_numbers_table([], 30.0)

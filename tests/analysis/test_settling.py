@@ -126,7 +126,7 @@ def test_several_seeds_give_the_spread_between_them():
 
 
 def test_other_quantities_and_cases_each_have_their_row():
-    runs = [run(phi=1e-3), run(phi=1e-5), run(phi=1e-3, galileo=0.156)]
+    runs = [run(phi=1e-3), run(phi=1e-5, variance=1.0), run(phi=1e-3, galileo=0.156)]
     table = steady_state(runs, 50.0, ["new_neighbours"])
     assert table[["volume_fraction", "galileo"]].to_numpy().tolist() == [
         [1e-5, 0.078],
@@ -137,7 +137,11 @@ def test_other_quantities_and_cases_each_have_their_row():
 
 
 def test_inverse_beta_table_takes_the_lowest_galileo_number_and_the_end_where_nothing_is_steady():
-    runs = [run(galileo=0.156, mean=2.0), run(galileo=0.078, mean=1.4), rising(phi=1e-4)]
+    runs = [
+        run(galileo=0.156, mean=2.0),
+        run(galileo=0.078, mean=1.4),
+        rising(phi=1e-4, variance=0.2),
+    ]
     table = inverse_beta_table(steady_state(runs, 50.0, BOTH))
     simulation = table[table["source"] == "simulation"].set_index("volume_fraction")
     assert simulation["status"].to_dict() == {1e-4: DRIFTING, 1e-3: STEADY}
@@ -176,7 +180,7 @@ def test_paths_are_displacements_from_the_first_step():
 
 
 def test_bad_series_are_refused():
-    with pytest.raises(ValueError, match="at least one series"):
+    with pytest.raises(ValueError, match="at least one is needed"):
         steady_state([], 50.0)
     with pytest.raises(ValueError, match="ends at 100"):
         steady_state([run()], 200.0)

@@ -124,7 +124,7 @@ def test_first_frame_and_snapshots_in_time_are_measured_and_volumes_normalised()
 
 
 def test_pdf_table_names_galileo_numbers_as_multiples_of_the_lowest():
-    table = voronoi_pdf_table([cells(galileo=0.312), cells(galileo=0.078)], 50.0, seed=1)
+    table = voronoi_pdf_table([cells(galileo=0.312), cells(galileo=0.078)], seed=1)
     assert table["source"].unique().tolist() == [
         "random start",
         "settling",
@@ -139,38 +139,38 @@ def test_variance_table_stands_beside_the_settling_velocity_of_the_same_case():
     found = {"status": "steady", "value": 1.4, "low": 1.3, "high": 1.5, "end": 1.6}
     steady = pd.DataFrame([case | found])
     spheres = random_sphere_table([1e-3], seed=1, particles=100)
-    table = voronoi_variance_table([cells()], steady, spheres, 50.0, seed=1)
+    table = voronoi_variance_table([cells()], steady, spheres, seed=1)
     assert set(table["source"]) == {"simulation", "random spheres", "random points", "paper"}
     ours = table[table["source"] != "paper"].set_index("source")
     assert (ours["inverse_beta"] == 1.4).all()
     assert ours.loc["random points", "variance"] == pytest.approx(0.89516)
-    found = pooled_volumes([cells()], 50.0).var(axis=1).mean()
+    found = pooled_volumes([cells()]).var(axis=1).mean()
     assert ours.loc["simulation", "variance"] == pytest.approx(found / 0.2)
     drifting = steady.assign(status="drifting", value=np.nan, low=np.nan, high=np.nan)
-    later = voronoi_variance_table([cells()], drifting, spheres, 50.0, seed=1).set_index("source")
+    later = voronoi_variance_table([cells()], drifting, spheres, seed=1).set_index("source")
     assert later.loc["simulation", "inverse_beta"] == 1.6
-    last = pooled_volumes([cells()], 100.0)
+    last = pooled_volumes([cells()], slice(-1, None))
     assert last.shape == (1, 60)
     assert later.loc["simulation", "variance"] == pytest.approx(last.var() / 0.2)
     expected = random_sphere_variance(1e-3, 100, seed=1)
     assert ours.loc["random spheres", "high"] == pytest.approx(expected["high"] / 0.2)
     with pytest.raises(ValueError, match="steady states has no row for"):
-        voronoi_variance_table([cells(galileo=0.3)], steady, spheres, 50.0, seed=1)
+        voronoi_variance_table([cells(galileo=0.3)], steady, spheres, seed=1)
     with pytest.raises(ValueError, match="random spheres has no row for phi"):
-        voronoi_variance_table([cells()], steady, spheres[:0], 50.0, seed=1)
+        voronoi_variance_table([cells()], steady, spheres[:0], seed=1)
     close = spheres.assign(volume_fraction=1e-3 + 1e-9)
     with pytest.raises(ValueError, match="random spheres has no row for phi"):
-        voronoi_variance_table([cells()], steady, close, 50.0, seed=1)
+        voronoi_variance_table([cells()], steady, close, seed=1)
 
 
 def test_seeds_of_a_case_are_pooled_and_narrow_the_interval():
-    one = pooled_volumes([cells(seed=1)], 0.0)
-    two = pooled_volumes([cells(seed=1), cells(seed=2)], 0.0)
-    assert two.shape == (6, 120)
+    one = pooled_volumes([cells(seed=1)])
+    two = pooled_volumes([cells(seed=1), cells(seed=2)])
+    assert two.shape == (5, 120)
     np.testing.assert_array_equal(two[:, :60], one)
     width = [v["high"] - v["low"] for v in (volume_variance(one, 1), volume_variance(two, 1))]
     assert width[1] < width[0]
-    pdf = voronoi_pdf_table([cells(seed=1), cells(seed=2)], 50.0, seed=1)
+    pdf = voronoi_pdf_table([cells(seed=1), cells(seed=2)], seed=1)
     assert pdf["galileo_multiple"].dropna().unique().tolist() == [1.0]
 
 
@@ -201,4 +201,4 @@ def test_bad_points_are_refused(points, lengths, match):
 
 def test_no_cells_are_refused():
     with pytest.raises(ValueError, match="at least one"):
-        voronoi_pdf_table([], 50.0, seed=1)
+        voronoi_pdf_table([], seed=1)

@@ -11,6 +11,7 @@ from dustfall.analysis.distributions import force_distributions, force_samples
 from dustfall.analysis.evaluation import error_by_gap
 from dustfall.analysis.mesh_study import mesh_study_table
 from dustfall.analysis.settling import inverse_beta_table
+from dustfall.figures.settling import WINDOWS
 from dustfall.figures.style import (
     PHI_RANGE,
     STYLE,
@@ -127,7 +128,10 @@ def inverse_beta():
 def settling_in_time():
     table = waves(lambda t, phi, p: {"time": t, "mean": 1 + phi * t, "variance": phi * t})
     table["n"] = table["particle"].map({1: 1000, 2: 10000, 3: 33000})
-    return table.drop(columns="particle").assign(model="idnn")
+    table = table.drop(columns="particle").assign(model="idnn")
+    table["spreading_times"] = table["time"] / 7
+    window = table["n"].map(dict.fromkeys((1000, 33000), WINDOWS[0]) | {10000: WINDOWS[1]})
+    return table.assign(window=window)
 
 
 def phase_and_spectra():
@@ -329,7 +333,9 @@ def test_panels_with_two_views_draw_both():
     table = settling_in_time()
     drawn = drawn_points(figures.settling_in_time(table))
     moving = table[table["variance"] > 0]
-    assert pairs(table, "time", "mean") | pairs(moving, "time", "variance") <= drawn
+    for window, clock in zip(WINDOWS, ("time", "spreading_times"), strict=True):
+        own, positive = (t[t["window"] == window] for t in (table, moving))
+        assert pairs(own, clock, "mean") | pairs(positive, clock, "variance") <= drawn
     table = phase_and_spectra()
     drawn = drawn_points(figures.phase_and_spectra(table))
     assert pairs(table[table["panel"] != "phase"], "x", "y") <= drawn

@@ -2,7 +2,9 @@ import warnings
 
 import pytest
 
-from dustfall.sedimentation import Properties
+from dustfall.forces.formulas import FORMULAS
+from dustfall.sedimentation import NearestNeighbours, Properties, random_start
+from dustfall.sedimentation.properties import mean_spacing
 
 
 def test_default_properties_are_those_of_the_papers_table():
@@ -67,3 +69,13 @@ def test_what_is_no_stokes_flow_is_refused_and_what_may_be_none_is_told():
             dust.with_galileo_multiple(multiple / dust.galileo).check_stokes_flow()
     with pytest.raises(ValueError, match="Galileo number is 1"):
         dust.with_galileo_multiple(1.001 / dust.galileo).check_stokes_flow()
+
+
+def test_a_random_cloud_spreads_by_its_mean_spacing_in_a_spreading_time():
+    properties = Properties()
+    for phi in (1e-3, 1e-6):
+        start = random_start(2000, phi, seed=1, velocity="stokes")
+        closure = NearestNeighbours(FORMULAS["rotne_prager"])
+        spread = (1 / closure(start).beta).std() * properties.stokes_number
+        moved = spread * properties.spreading_time(phi) / mean_spacing(phi)
+        assert moved == pytest.approx(1.1, abs=0.15), phi

@@ -2,6 +2,7 @@
 
 import pytest
 
+from dustfall.sedimentation import Schedule
 from workflow import plan
 from workflow.configuration import configure
 
@@ -28,6 +29,15 @@ FIGURES = [
 ]
 
 
+PLAIN = {
+    "models": [],
+    "back_flow": False,
+    "long": {"particles": []},
+    "all_particles": {"particles": []},
+}
+"""The cases of one model that last as long as the paper's, and no others."""
+
+
 def test_the_paper_takes_the_expected_jobs_and_fewer_than_a_thousand(project):
     jobs = project.plan("--", "all")
     shards = 2 * (14_000 // 2000) + 4_000 // 2000
@@ -49,17 +59,18 @@ def test_the_paper_takes_the_expected_jobs_and_fewer_than_a_thousand(project):
         "learning_curve": 1,
         "ablation": 1,
         "evaluation": 1,
-        # 3 numbers of particles, the fewest from 3 starts, 6 volume fractions, 2 more Galileo
-        # numbers, 4 models to compare: three closed formulas and the anchored IDNN
-        "sedimentation": (3 + 1 + 1) * 6 + 2 + 4 * 3 * 6,
-        # The fewest particles from 3 starts, ten times as many from one.
-        "all_particles": (3 + 1) * 6,
+        # 2 numbers of particles at 6 volume fractions, 3 Galileo numbers; long ones of 2 numbers,
+        # the fewest from 3 starts, and of what is compared: three closed formulas, the anchored
+        # IDNN and the back-flow.
+        "sedimentation": 2 * 6 + 3 + (3 + 1) * 6 + (4 + 1) * 6,
+        "all_particles": 2 * 6,
         "steady_state": 1,
         "independence_of_n": 1,
         "neighbour_changes": 1,
         "mesh_study": 1,
         "movie": 1,
-        "voronoi_cells": (3 + 1 + 1) * 6 + 2,
+        # The long cases and the Galileo numbers.
+        "voronoi_cells": (3 + 1) * 6 + 3,
         "random_spheres": 1,
         **{f"figure_{name}": 1 for name in FIGURES},
     }
@@ -74,7 +85,7 @@ def test_figures_is_a_target_that_leaves_the_tables_out(project):
 
 
 def test_exports_is_a_target_with_every_case(project):
-    assert project.plan("--", "exports")["export"] == 5 * 6 + 2 + 12 * 6 + 4 * 6
+    assert project.plan("--", "exports")["export"] == 2 * 6 + 3 + 4 * 6 + 5 * 6 + 2 * 6
 
 
 @pytest.mark.parametrize(("number", "size"), [(120, 40), (121, 40), (119, 40), (120, 1000)])
@@ -108,27 +119,30 @@ def test_case_names_tell_cases_apart():
 
 
 def test_cases_of_the_galileo_series_are_added_once():
-    one = {"models": [], "seeds": [1], "all_particles": {"particles": []}}
-    assert len(plan.cases(configure({"sedimentation": one}))) == 20
-    apart = configure({"sedimentation": one | {"galileo": {"particles": 500}}})
-    assert len(plan.cases(apart)) == 21
+    series = {"galileo": {"particles": 10_000}}
+    assert len(plan.cases(configure({"sedimentation": PLAIN | series}))) == 14
+    assert len(plan.cases(configure({"sedimentation": PLAIN}))) == 15
 
 
 def test_further_seeds_leave_the_names_of_the_first_as_they_are():
-    one = plan.cases(configure({"sedimentation": {"seeds": [1]}}))
+    one = plan.cases(configure({"sedimentation": {"long": {"seeds": [1]}}}))
     three = plan.cases(configure({"sedimentation": {"seeds": [3]}}))
-    assert len(three) == 3 * len(one)
-    assert list(three)[: len(one)] == list(one)
+    more = plan.cases(configure({"sedimentation": {"seeds": [3], "long": {"seeds": [3]}}}))
+    assert list(three)[: len(one)] == list(more)[: len(one)] == list(one)
+    # Those of the largest clouds, which are of the Galileo numbers alone, and compared long ones
+    # have one start.
+    single = [name for name, case in one.items() if case.particles == 33_000]
+    single += [name for name, case in one.items() if case.long and case.compared]
+    assert len(more) == 3 * len(one) - 2 * len(single)
     assert plan.Case(1000, 1e-3, 1.0, 2).name == "n1000_phi1e-03_ga1_seed2"
     assert len({plan.start_stream(case) for case in three}) == len(three)
 
 
 def test_each_number_of_particles_has_its_number_of_seeds_the_last_for_all_that_follow():
-    settle = {
+    settle = PLAIN | {
         "particles": [15, 20, 30],
         "seeds": [3, 2],
         "galileo": {"particles": 500},
-        "all_particles": {"particles": []},
     }
     cases = plan.cases(configure({"sedimentation": settle})).values()
     seeds = {n: max(case.seed for case in cases if case.particles == n) for n in (15, 20, 30, 500)}
@@ -171,26 +185,18 @@ def test_learning_curve_ends_with_all_scenes_where_a_model_has_fewer():
 def test_all_particles_start_where_nearest_neighbours_do():
     cases = plan.cases(configure({}))
     together = [case for case in cases.values() if case.compared == plan.ALL_PARTICLES]
-    assert len(together) == 6 * (3 + 1)
+    assert len(together) == 6 * 2
     assert all(case.start in cases for case in together)
 
 
 def test_every_case_starts_from_its_own_random_numbers():
-    config = configure({"sedimentation": {"models": [], "all_particles": {"particles": []}}})
+    config = configure({"sedimentation": PLAIN})
     items = [plan.start_stream(case.start) for case in plan.cases(config).values()]
     assert len(set(items)) == len(items)
 
 
 def test_compared_models_share_the_starts_of_the_smallest_cases():
-    config = configure(
-        {
-            "sedimentation": {
-                "models": ["isolated", "idnn"],
-                "seeds": [2],
-                "all_particles": {"particles": []},
-            }
-        }
-    )
+    config = configure({"sedimentation": PLAIN | {"models": ["isolated", "idnn"], "seeds": [2]}})
     cases = plan.cases(config)
     compared = {name: case for name, case in cases.items() if case.compared}
     assert len(compared) == 6 * 2
@@ -201,9 +207,38 @@ def test_compared_models_share_the_starts_of_the_smallest_cases():
         assert plan.force_model(config, case.start) == "idnn"
 
 
+def test_long_cases_start_where_the_others_do_and_stand_for_the_same_steady_state():
+    config = configure({})
+    cases = plan.cases(config)
+    assert "n1000_phi1e-04_ga1_long" in cases
+    assert cases["n1000_phi1e-04_ga1_seed2_long"].start == "n1000_phi1e-04_ga1_seed2"
+    settled = plan.settled_cases(config)
+    assert "n1000_phi1e-04_ga1_long" in settled
+    assert "n1000_phi1e-04_ga1" not in settled
+    assert "n33000_phi1e-03_ga2" in settled
+    assert "n1000_phi1e-04_ga1_all_particles" in settled
+    assert plan.settled_cases(configure({"sedimentation": PLAIN})) == (
+        list(plan.cases(configure({"sedimentation": PLAIN})))
+    )
+
+
+def test_a_long_case_lasts_the_longer_the_more_dilute_its_cloud():
+    config = configure({})
+    times = [plan.schedule(config, f"n1000_phi{phi}_ga1_long") for phi in ("1e-03", "1e-06")]
+    for time in times:
+        steps = time["duration"] / time["step"]
+        assert steps == pytest.approx(round(steps), rel=1e-12)
+        assert Schedule(**time).steps == 2500
+    # As the square of the spacing: a hundredfold for three decades.
+    assert times[1]["duration"] / times[0]["duration"] == pytest.approx(100, rel=0.01)
+    start = plan.statistics_from(config, "n1000_phi1e-06_ga1_long")
+    assert start / times[1]["duration"] == pytest.approx(0.4, rel=0.01)
+    assert plan.statistics_from(config, "n1000_phi1e-06_ga1") == 50
+
+
 def test_a_formula_added_as_one_file_is_allowed_and_its_cases_are_planned(project):
     name = project.add_documented_formula().stem
     words = project.dry_run("--config", f"sedimentation={{model: {name}}}", "--", "all")
-    assert f"n1000_phi1e-03_ga1_seed3_{name}.nc" not in words  # it is the campaign's own model
+    assert f"n1000_phi1e-03_ga1_{name}_long.nc" not in words  # it is the campaign's own model
     words = project.dry_run("--", "all")
-    assert f"results/sedimentation/n1000_phi1e-03_ga1_seed3_{name}.nc" in words
+    assert f"results/sedimentation/n1000_phi1e-03_ga1_{name}_long.nc" in words

@@ -37,7 +37,7 @@ rule mesh_study:
 rule steady_state:
     """Average every case over its steady state."""
     input:
-        series=expand("results/sedimentation/{case}.series.nc", case=CASES),
+        series=expand("results/sedimentation/{case}.series.nc", case=SETTLED_CASES),
     output:
         report(
             "results/analysis/steady_state.csv",
@@ -48,7 +48,7 @@ rule steady_state:
         "logs/analysis/steady_state.log",
     params:
         library=library("steady_state.py"),
-        statistics_from=config["sedimentation"]["statistics_from"],
+        starts=[plan.statistics_from(config, case) for case in SETTLED_CASES],
     script:
         "../scripts/steady_state.py"
 
@@ -85,7 +85,7 @@ rule neighbour_changes:
         "logs/analysis/neighbour_changes.log",
     params:
         library=library("neighbour_changes.py"),
-        statistics_from=config["sedimentation"]["statistics_from"],
+        starts=[plan.statistics_from(config, case) for case in NEIGHBOUR_CASES],
     script:
         "../scripts/neighbour_changes.py"
 
@@ -102,7 +102,7 @@ rule voronoi_cells:
         "benchmarks/analysis/voronoi/{case}.tsv"
     params:
         library=library("voronoi_cells.py"),
-        statistics_from=config["sedimentation"]["statistics_from"],
+        statistics_from=lambda wc: plan.statistics_from(config, wc.case),
         snapshots=config["figures"]["snapshots"],
     script:
         "../scripts/voronoi_cells.py"

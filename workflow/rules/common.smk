@@ -46,24 +46,21 @@ MESHES = expand(
 )
 CASES = plan.cases(config)
 
-# The cases among nearest neighbours; those of `sedimentation.model` at the Galileo number of the
-# properties; those of them with most particles, from dilute to dense and from one start each; and
-# the cases that differ in the Galileo number alone.
-NEIGHBOUR_CASES = [name for name, case in CASES.items() if case.compared != plan.ALL_PARTICLES]
-PLAIN_CASES = [
-    name for name, case in CASES.items() if case.galileo_multiple == 1 and not case.compared
-]
-LARGEST_CASES = [
-    name
-    for name in sorted(PLAIN_CASES, key=lambda name: CASES[name].volume_fraction)
-    if CASES[name].particles == max(config["sedimentation"]["particles"])
-    and CASES[name].volume_fraction in config["sedimentation"]["volume_fractions"]
-    and CASES[name].seed == 1
-]
+# The cases that tell the steady state, and those of them among nearest neighbours; the cases of
+# `sedimentation.model` at the Galileo number of the properties that last as long as the paper's,
+# and those that tell the steady state; of either those with most particles, from dilute to dense;
+# and the cases that differ in the Galileo number alone.
+SETTLED_CASES = plan.settled_cases(config)
+NEIGHBOUR_CASES = [name for name in SETTLED_CASES if CASES[name].compared != plan.ALL_PARTICLES]
+PLAIN_CASES = [name for name in CASES if plan.is_plain(CASES[name]) and not CASES[name].long]
+LONG_CASES = [name for name in CASES if plan.is_plain(CASES[name]) and CASES[name].long]
+SETTLED_PLAIN_CASES = [name for name in SETTLED_CASES if plan.is_plain(CASES[name])]
+LARGEST_CASES = plan.largest_cases(config, [])
+SETTLED_LARGEST_CASES = plan.largest_cases(config, config["sedimentation"]["long"]["particles"])
 GALILEO_CASES = [
     name
     for name, case in CASES.items()
-    if not case.compared
+    if not (case.compared or case.long)
     and case.particles == config["sedimentation"]["galileo"]["particles"]
     and case.volume_fraction == config["sedimentation"]["galileo"]["volume_fraction"]
 ]

@@ -106,6 +106,7 @@ rule figure_settling_in_time:
     """Mean and variance of the settling velocity in time."""
     input:
         series=expand("results/sedimentation/{case}.series.nc", case=PLAIN_CASES),
+        long=expand("results/sedimentation/{case}.series.nc", case=LONG_CASES),
     output:
         **figure("settling_in_time", "Sedimentation"),
     log:
@@ -136,14 +137,14 @@ rule figure_phase_and_spectra:
 rule figure_cloud_spectra:
     """Energy spectra averaged over all particles, with and without a window."""
     input:
-        trajectories=expand("results/sedimentation/{case}.nc", case=LARGEST_CASES),
+        trajectories=expand("results/sedimentation/{case}.nc", case=SETTLED_LARGEST_CASES),
     output:
         **figure("cloud_spectra", "Sedimentation"),
     log:
         "logs/figures/cloud_spectra.log",
     params:
         library=library("figure_cloud_spectra.py"),
-        statistics_from=config["sedimentation"]["statistics_from"],
+        starts=[plan.statistics_from(config, case) for case in SETTLED_LARGEST_CASES],
         fit_frequencies=config["figures"]["fit_frequencies"],
     script:
         "../scripts/figure_cloud_spectra.py"
@@ -152,14 +153,14 @@ rule figure_cloud_spectra:
 rule figure_ergodicity:
     """Time average against ensemble average of the settling velocity."""
     input:
-        trajectories=expand("results/sedimentation/{case}.nc", case=LARGEST_CASES),
+        trajectories=expand("results/sedimentation/{case}.nc", case=SETTLED_LARGEST_CASES),
     output:
         **figure("ergodicity", "Sedimentation"),
     log:
         "logs/figures/ergodicity.log",
     params:
         library=library("figure_ergodicity.py"),
-        statistics_from=config["sedimentation"]["statistics_from"],
+        starts=[plan.statistics_from(config, case) for case in SETTLED_LARGEST_CASES],
     script:
         "../scripts/figure_ergodicity.py"
 
@@ -195,7 +196,7 @@ rule figure_trajectories_3d:
 rule movie:
     """A slab of the densest cloud as it settles, coloured by velocity."""
     input:
-        trajectory=f"results/sedimentation/{LARGEST_CASES[-1]}.nc",
+        trajectory=f"results/sedimentation/{GALILEO_CASES[0]}.nc",
     output:
         report(
             "results/figures/settling_cloud.gif",
@@ -226,7 +227,6 @@ rule figure_voronoi_pdf:
     params:
         library=library("figure_voronoi_pdf.py"),
         seed=config["seed"],
-        statistics_from=config["sedimentation"]["statistics_from"],
     script:
         "../scripts/figure_voronoi_pdf.py"
 
@@ -236,7 +236,7 @@ rule figure_voronoi_variance:
     input:
         steady="results/analysis/steady_state.csv",
         spheres="results/analysis/random_spheres.csv",
-        cells=expand("results/analysis/voronoi/{case}.nc", case=PLAIN_CASES),
+        cells=expand("results/analysis/voronoi/{case}.nc", case=SETTLED_PLAIN_CASES),
     output:
         **figure("voronoi_variance", "Sedimentation"),
     log:
@@ -246,7 +246,6 @@ rule figure_voronoi_variance:
     params:
         library=library("figure_voronoi_variance.py"),
         seed=config["seed"],
-        statistics_from=config["sedimentation"]["statistics_from"],
     script:
         "../scripts/figure_voronoi_variance.py"
 

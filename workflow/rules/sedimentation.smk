@@ -11,7 +11,7 @@ rule sedimentation:
     benchmark:
         "benchmarks/sedimentation/{case}.tsv"
     wildcard_constraints:
-        case=r"(?!.*_all_particles\b)[\w.+-]+",
+        case=rf"(?!.*_{plan.ALL_PARTICLES}\b)[\w.+-]+",
     threads: config["sedimentation"]["threads"]
     # Not a parameter, because it changes no result.
     resources:
@@ -21,15 +21,14 @@ rule sedimentation:
         seed=config["seed"],
         stream=lambda wc: plan.start_stream(CASES[wc.case].start),
         model=lambda wc: plan.force_model(config, wc.case),
+        back_flow=lambda wc: CASES[wc.case].compared == plan.BACK_FLOW,
         particles=lambda wc: CASES[wc.case].particles,
         volume_fraction=lambda wc: CASES[wc.case].volume_fraction,
         galileo_multiple=lambda wc: CASES[wc.case].galileo_multiple,
         change=config["sedimentation"]["galileo"]["change"],
         properties=config["sedimentation"]["properties"],
         start=config["sedimentation"]["start"],
-        step=config["sedimentation"]["step"],
-        duration=config["sedimentation"]["duration"],
-        save_every=config["sedimentation"]["save_every"],
+        schedule=lambda wc: plan.schedule(config, wc.case),
         precision=config["sedimentation"]["precision"],
     script:
         "../scripts/settle.py"
@@ -47,7 +46,7 @@ rule all_particles:
     benchmark:
         "benchmarks/sedimentation/{case}.tsv"
     wildcard_constraints:
-        case=r"[\w.+-]+_all_particles",
+        case=rf"[\w.+-]+_{plan.ALL_PARTICLES}",
     threads: config["sedimentation"]["threads"]
     resources:
         checkpoint_interval=config["sedimentation"]["checkpoint_interval"],
@@ -63,9 +62,7 @@ rule all_particles:
         fluid=config["sedimentation"]["all_particles"]["fluid"],
         tolerance=config["sedimentation"]["all_particles"]["tolerance"],
         start=config["sedimentation"]["start"],
-        step=config["sedimentation"]["step"],
-        duration=config["sedimentation"]["duration"],
-        save_every=config["sedimentation"]["save_every"],
+        schedule=lambda wc: plan.schedule(config, wc.case),
         precision=config["sedimentation"]["precision"],
     script:
         "../scripts/settle_all_particles.py"

@@ -28,9 +28,11 @@ rule study_of_a_step:
         change=config["sedimentation"]["galileo"]["change"],
         properties=config["sedimentation"]["properties"],
         start=config["sedimentation"]["start"],
-        step=lambda wc: float(wc.case.removeprefix("step")),
-        duration=config["studies"]["duration"],
-        save_every=config["studies"]["duration"],
+        schedule=lambda wc: {
+            "step": float(wc.case.removeprefix("step")),
+            "duration": config["studies"]["duration"],
+            "save_interval": config["studies"]["duration"],
+        },
         precision=config["sedimentation"]["precision"],
     script:
         "../scripts/settle.py"
@@ -80,9 +82,7 @@ rule study_of_neighbours:
         change=config["sedimentation"]["galileo"]["change"],
         properties=config["sedimentation"]["properties"],
         start=config["sedimentation"]["start"],
-        step=config["sedimentation"]["step"],
-        duration=config["sedimentation"]["duration"],
-        save_every=config["sedimentation"]["duration"],
+        schedule=lambda wc: plan.long_schedule(config, float(wc.phi)),
         precision=config["sedimentation"]["precision"],
     script:
         "../scripts/settle.py"
@@ -102,6 +102,10 @@ rule neighbour_numbers:
         "logs/studies/neighbour_numbers.log",
     params:
         library=library("neighbour_numbers.py"),
-        statistics_from=config["sedimentation"]["statistics_from"],
+        starts=[
+            plan.long_statistics_from(config, phi)
+            for number in config["studies"]["neighbours"]
+            for phi in config["studies"]["neighbours_at"]
+        ],
     script:
         "../scripts/neighbour_numbers.py"

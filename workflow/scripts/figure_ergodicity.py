@@ -12,5 +12,5 @@ from dustfall.figures.style import save
 joblog.start(snakemake)
 
 trajectories = [xr.open_dataset(path) for path in snakemake.input.trajectories]
-table = ergodicity_table(trajectories, snakemake.params.statistics_from)
+table = ergodicity_table(trajectories, snakemake.params.starts)
 save(ergodicity(table), table, Path(snakemake.output.png).with_suffix(""))

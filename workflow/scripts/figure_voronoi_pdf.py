@@ -13,5 +13,5 @@ joblog.start(snakemake)
 
 params = snakemake.params
 cells = [xr.open_dataset(path) for path in snakemake.input.cells]
-table = voronoi_pdf_table(cells, params.statistics_from, params.seed)
+table = voronoi_pdf_table(cells, params.seed)
 save(voronoi_pdf(table), table, Path(snakemake.output.png).with_suffix(""))

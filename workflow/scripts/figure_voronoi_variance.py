@@ -17,5 +17,5 @@ steady = pd.read_csv(snakemake.input.steady)
 steady = steady[steady["quantity"] == "settling_velocity_mean"]
 spheres = pd.read_csv(snakemake.input.spheres)
 cells = [xr.open_dataset(path) for path in snakemake.input.cells]
-table = voronoi_variance_table(cells, steady, spheres, params.statistics_from, params.seed)
+table = voronoi_variance_table(cells, steady, spheres, params.seed)
 save(voronoi_variance(table), table, Path(snakemake.output.png).with_suffix(""))

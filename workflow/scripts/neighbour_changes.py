@@ -10,4 +10,4 @@ joblog.start(snakemake)
 
 runs = (xr.load_dataset(path) for path in snakemake.input.series)
 with atomic(snakemake.output[0]) as path:
-    neighbour_changes(runs, snakemake.params.statistics_from).to_csv(path, index=False)
+    neighbour_changes(runs, snakemake.params.starts).to_csv(path, index=False)

@@ -9,6 +9,6 @@ from dustfall.files import atomic
 joblog.start(snakemake)
 
 runs = (xr.load_dataset(path) for path in snakemake.input.series)
-table = neighbour_numbers_table(runs, snakemake.params.statistics_from)
+table = neighbour_numbers_table(runs, snakemake.params.starts)
 with atomic(snakemake.output[0]) as path:
     table.to_csv(path, index=False)

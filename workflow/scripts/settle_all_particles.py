@@ -8,7 +8,7 @@ progress, params = joblog.start(snakemake), snakemake.params
 properties = properties_of(params)
 closure = AllParticles(
     properties,
-    params.step,
+    params.schedule["step"],
     fluid=params.fluid,
     tolerance=params.tolerance,
     threads=snakemake.threads,

@@ -35,7 +35,7 @@ def settle_case(snakemake, closure: Closure, properties: Properties, progress: C
         params.stream,
         {"seed": params.seed, "stream": params.stream, "start": params.start},
     )
-    schedule = Schedule(params.step, params.duration, params.save_every)
+    schedule = Schedule(**params.schedule)
     checkpoint = Checkpoint(_checkpoint(snakemake), snakemake.resources.checkpoint_interval)
     bar = progress(case, "steps")
     try:

@@ -18,6 +18,6 @@ quantities = [
     "memory_from",
 ]
 runs = [xr.load_dataset(path) for path in snakemake.input.series]
-table = steady_state(runs, snakemake.params.statistics_from, quantities)
+table = steady_state(runs, snakemake.params.starts, quantities)
 with atomic(snakemake.output[0]) as path:
     table.to_csv(path, index=False)

@@ -217,7 +217,6 @@ class AllParticles(Closure):
             "fluid": self.fluid,
             "shortest_memory": self.shortest_memory,
             "tolerance": self.tolerance,
-            "closure_step": self.step,
             "kinematic_viscosity": self.viscosity,
         }
 
