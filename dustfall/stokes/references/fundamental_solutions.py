@@ -1,12 +1,13 @@
-"""The independent reference: n fixed spheres by the method of fundamental solutions.
+"""The independent reference: n spheres by the method of fundamental solutions.
 
 Point forces inside every sphere stir the fluid outside; their strengths are such that the fluid
-rests at more points on the surfaces than there are forces, in the sense of least squares. Nothing
-is integrated, nothing is expanded, and no code is shared with the boundary elements or with the
-surface harmonics: agreement with them is evidence. The error falls exponentially with the square
-root of the number of point forces, faster the wider the gaps.
+moves as the spheres do at more points on the surfaces than there are forces, in the sense of least
+squares. Nothing is integrated, nothing is expanded, and no code is shared with the boundary
+elements or with the surface harmonics: agreement with them is evidence. The error falls
+exponentially with the square root of the number of point forces, faster the wider the gaps: each
+sphere has as many as its own narrowest gap asks for.
 
-Lengths inside this module are in radii, velocities in units of the flow, viscosity is 1.
+Lengths inside this module are in d_p, velocities in units of the flow, viscosity is 1.
 """
 
 from dataclasses import dataclass
@@ -15,13 +16,20 @@ from functools import lru_cache
 import numpy as np
 from numba import njit
 from scipy.sparse.linalg import LinearOperator, gmres
-from scipy.spatial.distance import cdist
 
-from dustfall.spheres import checked_centres, checked_tolerance, flow_direction
-from dustfall.units import STOKES_DRAG
+from dustfall.spheres import (
+    centre_distances,
+    checked_centres,
+    checked_flow,
+    checked_numbers,
+    checked_positions,
+    checked_tolerance,
+    flow_direction,
+)
+from dustfall.units import FORCE_UNIT, RADIUS, STOKES_DRAG
 
-LADDER = [round(200 * 1.5**k) for k in range(9)]
-"""Numbers of point forces a sphere that are tried in turn: 200 to 5126."""
+LADDER = [round(200 * 1.5**k) for k in range(11)]
+"""Numbers of point forces a sphere that are tried in turn: 200 to 11,533."""
 
 MOST_INTERACTIONS = 2.5e8
 """Pairs of a force and a surface point that are summed, 2 to 3 ns each, once an iteration."""
@@ -29,7 +37,7 @@ MOST_INTERACTIONS = 2.5e8
 POINTS_PER_FORCE = 1.5
 
 DEPTH = 1e-9
-"""Radius of the point forces, to the power sqrt(their number).
+"""Radius of the point forces over that of the sphere, to the power sqrt(their number).
 
 Deeper ones resolve more, until their strengths, which alternate and grow, round the result off.
 """
@@ -40,6 +48,9 @@ ARMS = 0.7
 CUTOFF = 1e-12
 """Singular values of one sphere's operator below this part of the largest are left out."""
 
+FRESH_ARMS = 7
+"""Arms of the lattice of points at which the slip is measured: no lattice of the fit has as few."""
+
 MOST_ITERATIONS = 400
 
 CAUTION = 5.0
@@ -48,7 +59,34 @@ CAUTION = 5.0
 On 128 random pairs, gaps of 0.01 to 1 d_p, 6 % had more error than change, 2.6 times at most.
 """
 
+SLIP_SQUARED = 20.0
+"""Error of a load over slip^2 / gap [d of the smaller sphere].
+
+A load is off by the square of the slip, as the traction and the velocity err alike, and the more
+the narrower the gap. On random motions of pairs, radius ratios 1, 2 and 5, gaps of 0.01 to 0.1 d_p,
+the factor was 0.1 to 7. Without it, a large sphere that has too few forces on two rungs for the
+image of a small one goes unnoticed.
+"""
+
 GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
+
+
+@dataclass(frozen=True)
+class Loads:
+    """What the fluid exerts on n spheres, about their centres, and how well it is known.
+
+    force: (n, 3) [3 pi mu d_p U]. torque: (n, 3), stresslet: (n, 3, 3) [pi mu d_p^2 U].
+    error_estimate: (n,), of |force| / d, |torque| / d^2 and |stresslet| / d^2, d the sphere's
+    diameter, over the larger of what these are and of the fastest motion of any sphere against the
+    undisturbed flow, |velocity| + d |angular velocity| + d |strain|. slip: the largest velocity of
+    the fluid against the spheres, between the points where it was fitted, over that fastest motion.
+    """
+
+    force: np.ndarray
+    torque: np.ndarray
+    stresslet: np.ndarray
+    error_estimate: np.ndarray
+    slip: float
 
 
 def reference_forces(centres, flow=(0.0, 1.0, 0.0), tolerance: float = 1e-8):
@@ -67,103 +105,273 @@ def reference_forces(centres, flow=(0.0, 1.0, 0.0), tolerance: float = 1e-8):
     tolerance = checked_tolerance(tolerance, 1e-12, 0.1)
     if not np.any(flow):
         return np.zeros_like(centres), 0.0
-    rungs = _rungs(centres, tolerance)
-    goal = max(1e-3 * tolerance, 1e-13)
-    finer = solve_with(rungs[0], centres, flow, goal)
-    for number in rungs[1:]:
-        coarser, finer = finer, solve_with(number, centres, flow, goal)
+
+    def error(coarser, finer):
         change = np.abs(finer.forces - coarser.forces).max() / STOKES_DRAG
-        error = CAUTION * change + finer.residual
-        if error <= tolerance:
-            break
-    return finer.forces, float(error)
+        return CAUTION * change + finer.residual
+
+    found, estimate = _climbed(Spheres.fixed(centres, flow), tolerance, error)
+    return found.forces, float(estimate)
 
 
-def _rungs(centres, tolerance) -> list[int]:
-    """At least two rungs, from the one below that which the narrowest gap asks for.
+def reference_loads(
+    centres,
+    velocity,
+    angular_velocity=None,
+    flow=(0.0, 0.0, 0.0),
+    gradient=None,
+    radii=None,
+    tolerance: float = 1e-6,
+) -> Loads:
+    """Loads on n spheres of any radii that translate and turn in a linear Stokes flow.
 
-    With cosh(xi) = distance / d_p two spheres converge as exp(-2 xi sqrt(number)), and at best
-    as the lattice does, about exp(-sqrt(number)).
+    centres, velocity, angular_velocity: (n, 3); flow + gradient @ x, (3,) and (3, 3), is the
+    velocity far away; radii: (n,), 0.5 by default. Lengths in d_p, velocities in U. tolerance: of
+    the error estimate, 1e-12 to 0.1; where gaps are narrow or spheres many, the ladder may end
+    before it is met. Equal spheres that approach each other reach 1e-8 at a gap of 0.05 d_p.
+    Raises ValueError if shapes are wrong, values are not finite, the gradient has a trace, radii
+    are not positive, spheres overlap or touch, or the tolerance is out of range.
     """
+    spheres = _checked_spheres(centres, velocity, angular_velocity, flow, gradient, radii)
+    tolerance = checked_tolerance(tolerance, 1e-12, 0.1)
+    size = spheres.fastest()
+    if size == 0.0:
+        n = len(spheres.centres)
+        return Loads(*(np.zeros((n, *k)) for k in ((3,), (3,), (3, 3), ())), 0.0)
+
+    def error(coarser, finer):
+        changes, loads = _parts(spheres, finer, coarser), _parts(spheres, finer)
+        relative = CAUTION * changes.max(axis=0) / np.maximum(loads.max(axis=0), size)
+        return np.maximum(relative, amplified * (finer.slip() / size) ** 2) + finer.residual
+
+    gap = min(_gaps(spheres.centres, spheres.radii).min() / (2.0 * spheres.radii.min()), 1.0)
+    amplified = SLIP_SQUARED / gap
+    found, estimate = _climbed(spheres, tolerance, error)
+    return Loads(*found.loads(), estimate, found.slip() / size)
+
+
+def _parts(spheres, solution, less=None):
+    """|force| / d, |torque| / d^2, |stresslet| / d^2 (3, n) of a solution, or of a difference."""
+    diameter, loads = 2.0 * spheres.radii, solution.loads()
+    if less is not None:
+        loads = [own - other for own, other in zip(loads, less.loads(), strict=True)]
+    sizes = [np.sqrt(np.square(load.reshape(len(load), -1)).sum(axis=1)) for load in loads]
+    return np.array([sizes[0] / diameter, sizes[1] / diameter**2, sizes[2] / diameter**2])
+
+
+@dataclass(frozen=True)
+class Spheres:
+    """Centres, radii and the motion (n, 3), (n, 3) of n spheres in the flow + gradient @ x."""
+
+    centres: np.ndarray
+    radii: np.ndarray
+    velocity: np.ndarray
+    angular_velocity: np.ndarray
+    flow: np.ndarray
+    gradient: np.ndarray
+
+    @classmethod
+    def fixed(cls, centres, flow):
+        still = np.zeros_like(centres)
+        radii = np.full(len(centres), RADIUS)
+        return cls(centres, radii, still, still, flow, np.zeros((3, 3)))
+
+    def slip(self, i, points):
+        """Velocity (m, 3) of the undisturbed flow against sphere i at points about its centre."""
+        motion = self.velocity[i] + np.cross(self.angular_velocity[i], points)
+        return self.flow + (self.centres[i] + points) @ self.gradient.T - motion
+
+    def fastest(self):
+        """|velocity| + d (|angular velocity| + |strain|) against the flow, the largest of all."""
+        speed = self.flow + self.centres @ self.gradient.T - self.velocity
+        curl = [self.gradient[k - 1, k - 2] - self.gradient[k - 2, k - 1] for k in range(3)]
+        turning = np.linalg.norm(self.angular_velocity - 0.5 * np.array(curl), axis=1)
+        strain = np.linalg.norm(0.5 * (self.gradient + self.gradient.T))
+        return np.max(np.linalg.norm(speed, axis=1) + 2.0 * self.radii * (turning + strain))
+
+
+def _checked_spheres(centres, velocity, angular_velocity, flow, gradient, radii):
+    centres = checked_positions(centres)
     n = len(centres)
-    interactions = n * (n - 1) * POINTS_PER_FORCE * np.square(LADDER)
+
+    def checked(name, values, shape):
+        values = np.zeros(shape) if values is None else checked_numbers(name, values)
+        if values.shape != shape or not np.isfinite(values).all():
+            raise ValueError(f"{name} must be finite numbers of the shape {shape}")
+        return values
+
+    radii = checked("radii", np.full(n, RADIUS) if radii is None else radii, (n,))
+    if not (radii > 0.0).all():
+        raise ValueError(f"radii must be positive, not {radii.min():g}")
+    gap = _gaps(centres, radii)
+    i, j = np.unravel_index(gap.argmin(), gap.shape)
+    if gap[i, j] <= 0.0:
+        raise ValueError(f"spheres {i} and {j} overlap or touch: their gap is {gap[i, j]:.6g} d_p")
+    gradient = checked("gradient", gradient, (3, 3))
+    if abs(np.trace(gradient)) > 1e-12 * np.abs(gradient).max():
+        raise ValueError(f"gradient has the trace {np.trace(gradient):g}: the fluid's must be 0")
+    return Spheres(
+        centres,
+        radii,
+        checked("velocity", velocity, (n, 3)),
+        checked("angular_velocity", angular_velocity, (n, 3)),
+        checked_flow(flow),
+        gradient,
+    )
+
+
+def _gaps(centres, radii):
+    """(n, n) distances of surfaces [d_p], inf on the diagonal."""
+    return centre_distances(centres) - radii[:, None] - radii
+
+
+def _climbed(spheres: Spheres, tolerance, error):
+    """Solution and error on the first rung where the error against the rung before is allowed."""
+    rungs = _rungs(spheres, tolerance)
+    goal = max(1e-3 * tolerance, 1e-13)
+    finer = solve_with(rungs[0], spheres, goal)
+    for numbers in rungs[1:]:
+        coarser, finer = finer, solve_with(numbers, spheres, goal)
+        estimate = error(coarser, finer)
+        if np.max(estimate) <= tolerance:
+            break
+    return finer, estimate
+
+
+def _rungs(spheres, tolerance) -> list[np.ndarray]:
+    """Numbers of point forces (n,) to be tried, at least two, from one rung below what is needed.
+
+    A sphere's images in another converge at exp(-xi) of its radius, xi their bispherical
+    coordinate, and so its forces as exp(-2 xi sqrt(number)), and at best as the lattice does, about
+    exp(-sqrt(number)).
+    """
+    a, b = spheres.radii[:, None], spheres.radii
+    distance = centre_distances(spheres.centres)
+    gap = _gaps(spheres.centres, spheres.radii)
+    with np.errstate(invalid="ignore"):
+        both = np.arccosh(1.0 + gap * (gap + 2.0 * (a + b)) / (2.0 * a * b))
+        xi = np.arcsinh(b * np.sinh(both) / distance)
+    rate = np.minimum(2.0 * np.fmin.reduce(xi, axis=1, initial=np.inf), 1.0)
+    needed = np.searchsorted(LADDER, (np.log(1.0 / tolerance) / rate) ** 2)
+
+    steps = np.arange(-needed.max(), len(LADDER) - needed.min())
+    rungs = np.array(LADDER)[np.clip(needed + steps[:, None], 0, len(LADDER) - 1)]
+    interactions = POINTS_PER_FORCE * (rungs.sum(axis=1) ** 2 - (rungs**2).sum(axis=1))
     last = max(int(np.count_nonzero(interactions <= MOST_INTERACTIONS)), 2)
-    distance = cdist(centres, centres)[np.triu_indices(n, 1)].min(initial=np.inf)
-    rate = min(2.0 * np.arccosh(distance), 1.0)
-    needed = int(np.searchsorted(LADDER, (np.log(1.0 / tolerance) / rate) ** 2))
-    first = min(max(needed - 1, 0), last - 2)
-    return LADDER[first:last]
+    first = min(max(int(needed.max()) - 1, 0), last - 2)
+    return list(rungs[first:last])
 
 
 @dataclass(frozen=True)
 class Solution:
-    """Point forces of all spheres: their places (n, m, 3) [radii] and strengths (n, m, 3).
+    """Point forces of n spheres: of each, their places (m, 3) [d_p] and strengths (m, 3).
 
     residual: relative, of the linear system.
     """
 
-    flow: np.ndarray
-    places: np.ndarray
-    strengths: np.ndarray
+    spheres: Spheres
+    places: list[np.ndarray]
+    strengths: list[np.ndarray]
     residual: float
 
     @property
     def forces(self):
-        """(n, 3) in Re_p c_D: an isolated sphere feels 6 pi."""
-        return STOKES_DRAG / (6.0 * np.pi) * self.strengths.sum(axis=1)
+        """(n, 3) in Re_p c_D: a sphere alone feels 3 pi at unit velocity."""
+        return FORCE_UNIT * np.array([own.sum(axis=0) for own in self.strengths])
+
+    def loads(self):
+        """Force (n, 3), torque (n, 3) and stresslet (n, 3, 3), in the units of `Loads`."""
+        force, torque, stresslet = [], [], []
+        about = zip(self.spheres.centres, self.places, self.strengths, strict=True)
+        for centre, places, strengths in about:
+            moment = (places - centre).T @ strengths
+            force.append(strengths.sum(axis=0) / (3.0 * np.pi))
+            torque.append(np.cross(places - centre, strengths).sum(axis=0) / np.pi)
+            stresslet.append((moment + moment.T) / 2.0 - np.trace(moment) / 3.0 * np.eye(3))
+        return np.array(force), np.array(torque), np.array(stresslet) / np.pi
 
     def velocity(self, points):
         """Velocity (m, 3) of the fluid at points (m, 3) [d_p] outside the spheres."""
         stirred = np.zeros_like(points)
-        places = np.ascontiguousarray(self.places.reshape(-1, 3).T)
-        strengths = np.ascontiguousarray(self.strengths.reshape(-1, 3).T)
-        _add_stokeslets(np.ascontiguousarray(2.0 * points.T), places, strengths, stirred)
-        return self.flow - stirred
+        places, strengths = np.concatenate(self.places), np.concatenate(self.strengths)
+        _add_stokeslets(_columns(points), _columns(places), _columns(strengths), stirred)
+        return self.spheres.flow + points @ self.spheres.gradient.T - stirred
+
+    def slip(self):
+        """Largest velocity of the fluid against the spheres, between the points of the fit."""
+        spheres, found = self.spheres, 0.0
+        for i, (places, radius) in enumerate(zip(self.places, spheres.radii, strict=True)):
+            surface = radius * _lattice(POINTS_PER_FORCE * len(places), FRESH_ARMS, 0.6).reshape(
+                -1, 3
+            )
+            own = spheres.velocity[i] + np.cross(spheres.angular_velocity[i], surface)
+            slip = self.velocity(spheres.centres[i] + surface) - own
+            found = max(found, np.linalg.norm(slip, axis=1).max())
+        return float(found)
 
 
-def solve_with(number: int, centres, flow, goal: float = 1e-13) -> Solution:
-    """Solve for about `number` point forces in each sphere; GMRES aims at a residual of `goal`.
+def solve_with(numbers, spheres: Spheres, goal: float = 1e-13) -> Solution:
+    """Solve for about `numbers` point forces in each sphere; GMRES aims at a residual of `goal`.
 
-    centres: (n, 3) [d_p]. flow: (3,). Unknown are the coefficients of each sphere's forces in the
+    numbers: for all spheres, or (n,). Unknown are the coefficients of each sphere's forces in the
     singular basis of its own operator: they are of the size of the velocities, while the forces
     can be a million times larger.
     """
-    flow = flow_direction(flow)
-    sphere = _one_sphere(number)
-    n = len(centres)
-    forces = sphere.forces.reshape(-1, 3)
-    places = np.ascontiguousarray(forces.T)
-    points = sphere.points.reshape(-1, 3)
-    shift = 2.0 * (centres[:, None] - centres[None, :])
+    n = len(spheres.centres)
+    templates = [_one_sphere(int(number)) for number in np.broadcast_to(numbers, n)]
+    ends = np.cumsum([2 * template.values.size for template in templates])[:-1]
+    bodies = list(zip(templates, spheres.centres, spheres.radii, strict=True))
+    places = [centre + radius * own.forces.reshape(-1, 3) for own, centre, radius in bodies]
+    points = [centre + radius * own.points.reshape(-1, 3) for own, centre, radius in bodies]
+    sources, targets = [_columns(own) for own in places], [_columns(own) for own in points]
 
-    def others(coefficients):
-        """Coefficients of what all other spheres' forces stir on each sphere."""
-        strengths = sphere.strengths(coefficients.view(complex).reshape(n, *sphere.shape))
-        columns = [np.ascontiguousarray(own.reshape(-1, 3).T) for own in strengths]
-        velocity = np.zeros((n, *sphere.points.shape))
-        for i in range(n):
+    def strengths(coefficients):
+        """Of all point forces: those of a sphere stir as much as if it were larger and so they."""
+        parts = np.split(coefficients, ends)
+        return [
+            radius * own.strengths(part.view(complex).reshape(own.shape)).reshape(-1, 3)
+            for part, (own, _, radius) in zip(parts, bodies, strict=True)
+        ]
+
+    def coefficients(velocities):
+        return np.concatenate(
+            [
+                own.coefficients(velocity.reshape(own.points.shape)).ravel().view(float)
+                for own, velocity in zip(templates, velocities, strict=True)
+            ]
+        )
+
+    def with_others(unknown):
+        """Coefficients and those of what all other spheres' forces stir on each sphere."""
+        forces = [_columns(own) for own in strengths(unknown)]
+        velocities = [np.zeros_like(own) for own in points]
+        for i, velocity in enumerate(velocities):
             for j in range(n):
                 if i != j:
-                    seen_from = np.ascontiguousarray((points + shift[i, j]).T)
-                    _add_stokeslets(seen_from, places, columns[j], velocity[i].reshape(-1, 3))
-        return sphere.coefficients(velocity).ravel().view(float)
+                    _add_stokeslets(targets[i], sources[j], forces[j], velocity)
+        return unknown + coefficients(velocities)
 
-    uniform = np.broadcast_to(flow, (n, *sphere.points.shape))
-    right = sphere.coefficients(uniform).ravel().view(float)
-    operator = LinearOperator((len(right), len(right)), matvec=lambda x: x + others(x), dtype=float)
+    right = coefficients(
+        [spheres.slip(i, own - spheres.centres[i]) for i, own in enumerate(points)]
+    )
+    operator = LinearOperator((len(right), len(right)), matvec=with_others, dtype=float)
     solution, _ = gmres(operator, right, rtol=goal, restart=MOST_ITERATIONS, maxiter=1)
     residual = float(np.linalg.norm(operator @ solution - right) / np.linalg.norm(right))
-    strengths = sphere.strengths(solution.view(complex).reshape(n, *sphere.shape))
-    return Solution(flow, forces + 2.0 * centres[:, None], strengths.reshape(n, -1, 3), residual)
+    return Solution(spheres, places, strengths(solution), residual)
+
+
+def _columns(vectors):
+    """(3, m) of vectors (m, 3), contiguous."""
+    return np.ascontiguousarray(vectors.T)
 
 
 @dataclass(frozen=True)
 class _OneSphere:
     """The least-squares operator of a sphere, its singular values and both of its bases.
 
-    forces (arms, levels, 3), points (arms, more levels, 3) [radii]. A turn by one arm maps
-    both onto themselves, so in the axes of each arm the operator is a circular convolution, and
-    its Fourier transform along the arms falls into blocks: small ones, to be decomposed one by one.
+    forces (arms, levels, 3), points (arms, more levels, 3) of the unit sphere. A turn by one arm
+    maps both onto themselves, so in the axes of each arm the operator is a circular convolution,
+    and its Fourier transform along the arms falls into blocks: small ones, decomposed one by one.
     """
 
     forces: np.ndarray
@@ -178,20 +386,19 @@ class _OneSphere:
         return self.values.shape
 
     def coefficients(self, velocity):
-        """(n, blocks, values) that a velocity (n, arms, more levels, 3) at the points has."""
-        local = (velocity @ self.axes).reshape(len(velocity), len(self.axes), -1)
-        waves = np.fft.rfft(local, axis=1).transpose(1, 0, 2)
-        return np.ascontiguousarray((waves @ self.left.conj()).transpose(1, 0, 2))
+        """(blocks, values) that a velocity (arms, more levels, 3) at the points has."""
+        local = (velocity @ self.axes).reshape(len(self.axes), -1)
+        waves = np.fft.rfft(local, axis=0)[:, None]
+        return np.ascontiguousarray((waves @ self.left.conj())[:, 0])
 
     def strengths(self, coefficients):
-        """(n, arms, levels, 3) of the forces that stir the velocity of these coefficients."""
-        waves = (coefficients / self.values).transpose(1, 0, 2) @ self.right.conj()
-        local = np.fft.irfft(waves.transpose(1, 0, 2), len(self.axes), axis=1)
-        local = local.reshape(len(coefficients), *self.forces.shape)
-        return local @ self.axes.transpose(0, 2, 1)
+        """(arms, levels, 3) of the forces that stir the velocity of these coefficients."""
+        waves = (coefficients / self.values)[:, None] @ self.right.conj()
+        local = np.fft.irfft(waves[:, 0], len(self.axes), axis=0)
+        return local.reshape(self.forces.shape) @ self.axes.transpose(0, 2, 1)
 
 
-@lru_cache(maxsize=3)
+@lru_cache(maxsize=len(LADDER))
 def _one_sphere(number: int) -> _OneSphere:
     arms = round(ARMS * np.sqrt(number))
     forces = DEPTH ** (1.0 / np.sqrt(number)) * _lattice(number, arms, 0.0)
