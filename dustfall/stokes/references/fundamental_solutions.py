@@ -21,9 +21,11 @@ from dustfall.spheres import (
     centre_distances,
     checked_centres,
     checked_flow,
-    checked_numbers,
+    checked_gradient,
     checked_positions,
+    checked_radii,
     checked_tolerance,
+    checked_vectors,
     flow_direction,
 )
 from dustfall.units import FORCE_UNIT, RADIUS, STOKES_DRAG
@@ -132,12 +134,22 @@ def reference_loads(
     Raises ValueError if shapes are wrong, values are not finite, the gradient has a trace, radii
     are not positive, spheres overlap or touch, or the tolerance is out of range.
     """
-    spheres = _checked_spheres(centres, velocity, angular_velocity, flow, gradient, radii)
+    centres = checked_positions(centres)
+    n = len(centres)
+    radii = checked_radii(radii, n)
+    spheres = Spheres(
+        checked_centres(centres, radii),
+        radii,
+        checked_vectors("velocity", velocity, n),
+        checked_vectors("angular_velocity", angular_velocity, n),
+        checked_flow(flow),
+        checked_gradient(gradient),
+    )
     tolerance = checked_tolerance(tolerance, 1e-12, 0.1)
     size = spheres.fastest()
     if size == 0.0:
-        n = len(spheres.centres)
-        return Loads(*(np.zeros((n, *k)) for k in ((3,), (3,), (3, 3), ())), 0.0)
+        still = np.zeros((n, 3))
+        return Loads(still, still, np.zeros((n, 3, 3)), np.zeros(n), 0.0)
 
     def error(coarser, finer):
         changes, loads = _parts(spheres, finer, coarser), _parts(spheres, finer)
@@ -147,7 +159,8 @@ def reference_loads(
     gap = min(_gaps(spheres.centres, spheres.radii).min() / (2.0 * spheres.radii.min()), 1.0)
     amplified = SLIP_SQUARED / gap
     found, estimate = _climbed(spheres, tolerance, error)
-    return Loads(*found.loads(), estimate, found.slip() / size)
+    force, torque, stresslet = found.loads()
+    return Loads(force, torque, stresslet, estimate, found.slip() / size)
 
 
 def _parts(spheres, solution, less=None):
@@ -188,36 +201,6 @@ class Spheres:
         turning = np.linalg.norm(self.angular_velocity - 0.5 * np.array(curl), axis=1)
         strain = np.linalg.norm(0.5 * (self.gradient + self.gradient.T))
         return np.max(np.linalg.norm(speed, axis=1) + 2.0 * self.radii * (turning + strain))
-
-
-def _checked_spheres(centres, velocity, angular_velocity, flow, gradient, radii):
-    centres = checked_positions(centres)
-    n = len(centres)
-
-    def checked(name, values, shape):
-        values = np.zeros(shape) if values is None else checked_numbers(name, values)
-        if values.shape != shape or not np.isfinite(values).all():
-            raise ValueError(f"{name} must be finite numbers of the shape {shape}")
-        return values
-
-    radii = checked("radii", np.full(n, RADIUS) if radii is None else radii, (n,))
-    if not (radii > 0.0).all():
-        raise ValueError(f"radii must be positive, not {radii.min():g}")
-    gap = _gaps(centres, radii)
-    i, j = np.unravel_index(gap.argmin(), gap.shape)
-    if gap[i, j] <= 0.0:
-        raise ValueError(f"spheres {i} and {j} overlap or touch: their gap is {gap[i, j]:.6g} d_p")
-    gradient = checked("gradient", gradient, (3, 3))
-    if abs(np.trace(gradient)) > 1e-12 * np.abs(gradient).max():
-        raise ValueError(f"gradient has the trace {np.trace(gradient):g}: the fluid's must be 0")
-    return Spheres(
-        centres,
-        radii,
-        checked("velocity", velocity, (n, 3)),
-        checked("angular_velocity", angular_velocity, (n, 3)),
-        checked_flow(flow),
-        gradient,
-    )
 
 
 def _gaps(centres, radii):

@@ -21,7 +21,13 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.linalg import splu
 
-from dustfall.spheres import checked_flow, checked_numbers
+from dustfall.spheres import (
+    checked_centres,
+    checked_flow,
+    checked_gradient,
+    checked_radii,
+    checked_vectors,
+)
 from dustfall.units import RADIUS
 
 SMALLEST_GAP, LARGEST_GAP = 1e-6, 1e4
@@ -93,9 +99,7 @@ def pair_resistance(gap: float, radii=(RADIUS, RADIUS)) -> PairResistance:
     Raises ValueError for radii that are not two positive numbers within LARGEST_RATIO of each other
     and for gaps outside SMALLEST_GAP to LARGEST_GAP, both over the smaller radius.
     """
-    radii = checked_numbers("radii", radii)
-    if radii.shape != (2,) or not np.isfinite(radii).all() or not (radii > 0.0).all():
-        raise ValueError(f"radii must be two positive numbers, not {radii.tolist()}")
+    radii = checked_radii(radii, 2)
     if radii.max() > LARGEST_RATIO * radii.min():
         raise ValueError(f"radii {radii.tolist()}: their ratio may be {LARGEST_RATIO:g} at most")
     if not SMALLEST_GAP <= gap / radii.min() <= LARGEST_GAP:
@@ -118,19 +122,18 @@ def loads_on_two_spheres(
     Raises ValueError for other shapes, numbers that are not finite, a gradient with a trace, and
     what `pair_resistance` refuses.
     """
-    centres = _checked("centres", centres, (2, 3))
-    gradient = _checked("gradient", np.zeros((3, 3)) if gradient is None else gradient, (3, 3))
-    if abs(np.trace(gradient)) > 1e-12 * np.abs(gradient).max():
-        raise ValueError(f"gradient has the trace {np.trace(gradient):g}: the fluid's must be 0")
-    radii = np.full(2, RADIUS) if radii is None else checked_numbers("radii", radii)
+    radii = checked_radii(radii, 2)
+    centres = checked_centres(centres, radii)
+    if len(centres) != 2:
+        raise ValueError(f"centres must have the shape (2, 3), not {centres.shape}")
+    gradient = checked_gradient(gradient)
     line = centres[0] - centres[1]
     distance = np.linalg.norm(line)
     resistance = pair_resistance(distance - radii.sum(), radii)
 
     spin = 0.5 * np.array([gradient[k - 1, k - 2] - gradient[k - 2, k - 1] for k in range(3)])
-    turning = np.zeros((2, 3)) if angular_velocity is None else angular_velocity
-    turning = _checked("angular_velocity", turning, (2, 3)) - spin
-    moving = _checked("velocity", velocity, (2, 3)) - checked_flow(flow) - centres @ gradient.T
+    turning = checked_vectors("angular_velocity", angular_velocity, 2) - spin
+    moving = checked_vectors("velocity", velocity, 2) - checked_flow(flow) - centres @ gradient.T
     frame = _frame(line / distance)
     moving, turning = moving @ frame.T, turning @ frame.T
     strain = -frame @ (0.5 * (gradient + gradient.T)) @ frame.T
@@ -154,13 +157,6 @@ def loads_on_two_spheres(
         [[planar, strain[0, 1], 0.0], [strain[0, 1], -planar, 0.0], [0.0, 0.0, 0.0]]
     )
     return Loads(-force @ frame, -torque @ frame, -frame.T @ stresslet @ frame)
-
-
-def _checked(name, values, shape):
-    values = checked_numbers(name, values)
-    if values.shape != shape or not np.isfinite(values).all():
-        raise ValueError(f"{name} must be finite numbers of the shape {shape}")
-    return values
 
 
 def _frame(line):

@@ -260,7 +260,7 @@ def test_loads_scale_with_the_size_of_the_scene():
         ({"angular_velocity": np.full((3, 3), np.inf)}, "angular_velocity"),
         ({"gradient": np.eye(3)}, "gradient has the trace"),
         ({"radii": [0.5, 0.5]}, "radii must"),
-        ({"radii": [0.5, 0.5, 0.0]}, "must be positive"),
+        ({"radii": [0.5, 0.5, 0.0]}, "radius of sphere 2 is 0.0"),
         ({"radii": [0.5, 0.9, 0.8]}, "spheres 0 and 1 overlap or touch"),
     ],
 )
