@@ -237,9 +237,14 @@ def largest_cases(config: dict, long: list[int]) -> list[str]:
 def schedule(config: dict, case: str) -> dict[str, float]:
     """Step, duration and time between frames of a case [tau]."""
     one = cases(config)[case]
-    settle = config["sedimentation"]
     if one.long:
         return long_schedule(config, one.volume_fraction, one.galileo_multiple)
+    return short_schedule(config)
+
+
+def short_schedule(config: dict) -> dict[str, float]:
+    """Step, duration and time between frames [tau] of a case that lasts as long as the paper's."""
+    settle = config["sedimentation"]
     return {
         "step": settle["step"],
         "duration": settle["duration"],

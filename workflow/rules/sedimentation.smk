@@ -62,7 +62,7 @@ rule all_particles:
         fluid=config["sedimentation"]["all_particles"]["fluid"],
         tolerance=config["sedimentation"]["all_particles"]["tolerance"],
         start=config["sedimentation"]["start"],
-        schedule=lambda wc: plan.schedule(config, wc.case),
+        schedule=plan.short_schedule(config),
         precision=config["sedimentation"]["precision"],
     script:
         "../scripts/settle_all_particles.py"
