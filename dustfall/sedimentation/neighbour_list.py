@@ -12,8 +12,8 @@ from dustfall.sedimentation.neighbours import (
     nearest_within,
     separations,
     sort_by_cell,
-    wrap,
 )
+from dustfall.suspension.cube import folded
 from dustfall.units import NEIGHBOURS
 
 CANDIDATES = 4.8
@@ -91,7 +91,7 @@ class NeighbourList:
         Raises ValueError for positions that `nearest_neighbours` refuses.
         """
         position = check_positions(position, self.box_length, self.index.shape[1])
-        self._wrapped = wrap(position, self.box_length)
+        self._wrapped = folded(position, self.box_length)
         if self._before is not None:
             _add_way(self._way, position, self._before, self.box_length)
         self._before = position

@@ -9,6 +9,7 @@ from numba import njit
 
 from dustfall.sedimentation.blocks import Blocks
 from dustfall.spheres import checked_numbers
+from dustfall.suspension.cube import folded
 from dustfall.units import NEIGHBOURS
 
 EXPECTED_WITHIN = 2.8
@@ -53,7 +54,7 @@ def nearest_neighbours(
     """
     position = check_positions(position, box_length, number)
     n = len(position)
-    wrapped = wrap(position, box_length)
+    wrapped = folded(position, box_length)
     cells = sort_by_cell(wrapped, box_length)
     index = np.empty((n, number), np.int32)
     with Blocks(n) as blocks:
@@ -84,18 +85,6 @@ def check_positions(position: np.ndarray, box_length: float, number: int) -> np.
             f"{FARTHEST:g} sides of the cube"
         )
     return position
-
-
-@njit(cache=True, nogil=True)
-def wrap(position, box_length):
-    """Positions (n, 3) folded into the cube, 0 <= x < box_length."""
-    wrapped = np.empty_like(position)
-    for i in range(len(position)):
-        for axis in range(3):
-            x = position[i, axis] - box_length * np.floor(position[i, axis] / box_length)
-            # Rounding puts a coordinate just below a multiple of the side outside the cube.
-            wrapped[i, axis] = x if 0.0 <= x < box_length else 0.0
-    return wrapped
 
 
 @njit(cache=True, nogil=True)

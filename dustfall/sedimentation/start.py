@@ -8,10 +8,11 @@ import numpy as np
 from numba import njit
 from scipy.spatial import cKDTree
 
-from dustfall.sedimentation.neighbours import FARTHEST, sort_by_cell, wrap
+from dustfall.sedimentation.neighbours import FARTHEST, sort_by_cell
 from dustfall.sedimentation.state import State, box_length
 from dustfall.sedimentation.trajectory import open_run
 from dustfall.spheres import checked_numbers
+from dustfall.suspension.cube import folded
 from dustfall.streams import Purpose, stream
 from dustfall.units import CONTACT
 
@@ -225,7 +226,7 @@ def _last_frame(path, file, name, units, shape):
 
 def _refuse_overlaps(path: Path, position: np.ndarray, length: float) -> None:
     """Raise ValueError that names the first two lines whose spheres overlap."""
-    wrapped = wrap(position, length)
+    wrapped = folded(position, length)
     extent = np.ptp(position, axis=0).max()
     hint = "; in units of a diameter: these look like metres" if extent < 1.0 else ""
     if len(position) < 2:

@@ -9,6 +9,7 @@ import scipy.fft
 from numba import njit
 
 from dustfall.spheres import checked_positions
+from dustfall.suspension.cube import folded
 from dustfall.suspension.rotne_prager import pair_coefficients
 from dustfall.suspension.splitting import Splitting, choose_splitting
 from dustfall.suspension.window import fold, unfold, window_kernels, window_polynomials
@@ -74,7 +75,7 @@ class PeriodicMobility:
             raise ValueError(f"side of the cube is {side}: it has to be positive and finite")
         if threads < 1:
             raise ValueError(f"threads is {threads}: it has to be at least 1")
-        inside = wrapped(positions, side)
+        inside = folded(positions, side)
         if splitting is None:
             splitting = _splitting_for(inside, side, tolerance)
         elif splitting.side != side:
@@ -222,14 +223,6 @@ class PeriodicMobility:
             with ThreadPoolExecutor(self._threads) as pool:
                 for done in [pool.submit(call) for call in calls]:
                     done.result()
-
-
-def wrapped(positions: np.ndarray, side: float) -> np.ndarray:
-    """Positions (n, 3) folded into the cube, 0 <= x < side."""
-    inside = positions - side * np.floor(positions / side)
-    # Rounding puts a coordinate just below a multiple of the side outside the cube.
-    inside[(inside < 0.0) | (inside >= side)] = 0.0
-    return inside
 
 
 def _splitting_for(positions, side, tolerance):

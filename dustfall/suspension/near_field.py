@@ -14,7 +14,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.spatial import cKDTree
 
 from dustfall.suspension.conjugate_gradients import conjugate_gradients
-from dustfall.suspension.ewald import wrapped
+from dustfall.suspension.cube import folded
 from dustfall.suspension.rotne_prager import pair_coefficients
 from dustfall.units import CONTACT
 
@@ -98,7 +98,7 @@ class NearField:
     def __init__(self, position: np.ndarray, side: float, way: np.ndarray, stiff: float):
         if side <= 2 * REACH:
             raise ValueError(f"side of the cube is {side}: more than {2 * REACH} d_p is needed")
-        tree = cKDTree(wrapped(position, side), boxsize=side)
+        tree = cKDTree(folded(position, side), boxsize=side)
         # As far as two particles can see each other come, and less than half the side.
         fastest = 2 * np.linalg.norm(way - way.mean(axis=0), axis=1).max()
         reach = min(max(REACH, CONTACT + fastest), side / 2)

@@ -3,8 +3,6 @@ import pytest
 from scipy.spatial import cKDTree
 
 from dustfall.sedimentation import nearest_neighbours
-from dustfall.sedimentation.neighbours import wrap
-from dustfall.suspension.ewald import wrapped
 
 
 def reference(position, side):
@@ -61,15 +59,6 @@ def test_neighbours_are_the_five_nearest_of_a_periodic_tree(case):
         same = np.sort(index, axis=1) == np.sort(expected, axis=1)
         sixth = cKDTree(position % side, boxsize=side).query(position % side, k=7)[0][:, 6]
         assert same[distinct & (sixth - distance[:, 4] > 10 * tolerance)].all()
-
-
-def test_coordinates_just_below_whole_sides_stay_inside():
-    side = 37.123456789
-    below = np.nextafter(side * np.arange(2000.0), -np.inf)
-    position = np.stack([below, below[::-1], below], axis=1)
-    for folded in (wrap(position, side), wrapped(position, side)):
-        assert (folded >= 0.0).all()
-        assert (folded < side).all()
 
 
 @pytest.mark.parametrize("number", [1, 12, 50])
