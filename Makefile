@@ -13,6 +13,7 @@ APT_INSTALL := apt-get update && apt-get install -y --no-install-recommends
 .PHONY: run test openfoam openfoam-test environment gmsh-libraries clean-environment
 
 run: environment
+	@$(VENV)/bin/python -m workflow.configuration $(CONFIG)
 	$(VENV)/bin/snakemake --configfile $(CONFIG) -- all
 
 test: environment

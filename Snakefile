@@ -10,7 +10,8 @@ from snakemake.utils import min_version
 
 from dustfall.forces.registry import trained_models
 from workflow import plan, stops
-from workflow.configuration import ConfigurationError, configure
+from workflow.configuration import ConfigurationError, configure, read_file
+from workflow.cost import GO_ON, CostError, check_jobs, check_plan, cost
 from workflow.library import ROOT, digest, library_files
 
 min_version("9.0")
@@ -20,8 +21,13 @@ configfile: ROOT / "config" / "config.yaml"
 
 
 try:
+    go_on = config.pop(GO_ON, False)
+    for file in workflow.configfiles:
+        read_file(file)
     config = configure(config)
-except ConfigurationError as error:
+    bound = cost(config)
+    check_plan(bound, go_on)
+except (ConfigurationError, CostError) as error:
     sys.exit(f"Configuration: {error}")
 
 # The library of this checkout is the one whose files the rules watch, so it is the one they run;
@@ -112,6 +118,12 @@ rule verify:
 
 onstart:
     stops.clear()
+    print(f"The whole campaign takes about {bound}; what is there already is not made again.")
+    if workflow.local_exec:
+        try:
+            check_jobs(bound, workflow.cores or 1, config["idnn"]["device"], go_on)
+        except CostError as error:
+            sys.exit(f"Configuration: {error}")
 
 
 onsuccess:

@@ -1,11 +1,14 @@
 """The configuration: completed with defaults and checked before the first job.
 
-`python -m workflow.configuration` prints the table of keys that config/README.md holds.
+`python -m workflow.configuration` prints the table of keys that config/README.md holds, and
+`python -m workflow.configuration config/mine.yaml` checks a file without running anything in it.
 """
 
 import difflib
 import math
 import re
+import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 import jsonschema
@@ -13,8 +16,11 @@ import yaml
 
 from dustfall.forces.registry import settling_models, trained_models
 from dustfall.scenes import LAWS
+from dustfall.sedimentation.properties import MOST_GALILEO, Properties
 from dustfall.sedimentation.state import box_length
 from dustfall.suspension.near_field import REACH
+from workflow import plan
+from workflow.cost import cost
 from workflow.readers import read_by, readers
 
 SCHEMA = Path(__file__).parent / "schemas" / "config.schema.yaml"
@@ -29,8 +35,25 @@ ENUMS = {
 
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
+MOST_BYTES = 10**6
+"""Of a file of settings: all keys with their defaults fill four thousand."""
+
+EXPRESSIONS = "__use_yte__"
+"""Key that has Snakemake evaluate a file of settings as a template with Python in it."""
+
+LARGEST = 2**63
+"""Magnitude of a number beyond which no file of results has room for it."""
+
 STEADY_STEPS = 20
 """Fewest steps that a steady state is averaged, and its spectrum taken, over."""
+
+STEADY_FRAMES = 12
+"""Fewest frames after its first that the spectrum of a cloud is taken over: a quarter of them lies
+below the highest frequency that is fitted, and a slope needs three."""
+
+FITTED_VALUES, HIGHEST_FITTED, SHORTEST_SEGMENT, BINS_PER_DECADE = 3, 0.25, 24, 20
+"""What `analysis.spectra` needs for a slope and calls by these names; a test holds both together,
+because importing it costs every start of Snakemake a second."""
 
 
 class ConfigurationError(ValueError):
@@ -55,6 +78,71 @@ def configure(settings: dict) -> dict:
         raise ConfigurationError(_sentence(error))
     _check_physics(complete)
     return complete
+
+
+def read_file(path: str | Path) -> dict:
+    """Read a file of settings as plain values.
+
+    Snakemake reads such a file itself: of a key that stands there twice it takes the last, and
+    where the file says so it runs the expressions in it. Raises ConfigurationError, with the line,
+    for those, for anything that is no YAML, and for a file that is missing, huge or no mapping.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise ConfigurationError(f"{path} is no file; config/ holds those that come with dustfall.")
+    if path.stat().st_size > MOST_BYTES:
+        raise ConfigurationError(
+            f"{path} has {path.stat().st_size} bytes, allowed are {MOST_BYTES}."
+        )
+    try:
+        loader = yaml.SafeLoader(path.read_text(encoding="utf-8"))
+        root = loader.get_single_node()
+        settings = {} if root is None else _checked(root, path, loader)
+    except UnicodeDecodeError as error:
+        raise ConfigurationError(f"{path} is no text in UTF-8: {error}.") from None
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        place = f", line {mark.line + 1}" if mark else ""
+        words = getattr(error, "problem", None) or str(error)
+        raise ConfigurationError(
+            f"{path}{place} is no YAML: {' '.join(str(words).split())}."
+        ) from None
+    except (RecursionError, ValueError) as error:
+        if isinstance(error, ConfigurationError):
+            raise
+        raise ConfigurationError(f"{path} cannot be read as YAML: {error}.") from None
+    if not isinstance(settings, dict):
+        raise ConfigurationError(f"{path} must hold sections and keys, like: seed: 1.")
+    return settings
+
+
+def _checked(root: yaml.Node, path: Path, loader: yaml.SafeLoader):
+    """The value of a YAML document without keys that stand twice, aliases, or expressions."""
+    waiting, seen = [root], set()
+    while waiting:
+        node = waiting.pop()
+        line = f"{path}, line {node.start_mark.line + 1}"
+        if id(node) in seen:
+            raise ConfigurationError(f"{line}: an alias repeats this part, but is not allowed.")
+        seen.add(id(node))
+        if isinstance(node, yaml.SequenceNode):
+            waiting += node.value
+        elif isinstance(node, yaml.MappingNode):
+            lines: dict[str, int] = {}
+            for key, value in node.value:
+                name, place = str(key.value), key.start_mark.line + 1
+                if name == EXPRESSIONS:
+                    raise ConfigurationError(
+                        f"{path}, line {place}: {name} has Snakemake run what the file says, but a "
+                        "configuration holds values alone."
+                    )
+                if name in lines:
+                    raise ConfigurationError(
+                        f"{path} sets {name} twice, in line {lines[name]} and in line {place}."
+                    )
+                lines[name] = place
+                waiting.append(value)
+    return loader.construct_document(root)
 
 
 def defaults(schema: dict) -> object:
@@ -125,8 +213,10 @@ def _number(value, schema, path):
         value = float(value)
     if isinstance(value, bool) or not isinstance(value, int | float):
         return value
-    if not math.isfinite(value):
-        raise ConfigurationError(f"{path} is {value}, but must be {_allowed(schema)}.")
+    if abs(value) > LARGEST or value != value:
+        # Whole numbers of any length are numbers in YAML; thousands of digits help nobody.
+        shown = f"{value:g}" if isinstance(value, float) else "a number of very many digits"
+        raise ConfigurationError(f"{path} is {shown}, but must be {_allowed(schema)}.")
     if schema["type"] == "integer":
         return int(value) if value == int(value) else value
     return float(value)
@@ -184,18 +274,19 @@ def _show(value) -> str:
 def _check_physics(config: dict) -> None:
     """Refuse what each key allows alone, but not together with the others."""
     scenes, settle, figures = config["scenes"], config["sedimentation"], config["figures"]
+    idnn = config["idnn"]
     _require(
         scenes["phi_min"] < scenes["phi_max"],
         f"scenes.phi_min is {scenes['phi_min']:g}, but must be below scenes.phi_max, "
         f"which is {scenes['phi_max']:g}.",
     )
-    laws = config["idnn"]["laws"]
+    laws = idnn["laws"]
     drawn = sum(scenes["number"][law] for law in laws)
-    fewest = 10 * config["idnn"]["folds"]
+    fewest = 10 * idnn["folds"]
     _require(
         drawn >= fewest,
         f"scenes.number is {drawn} in all of {', '.join(laws)}, but must be at least {fewest}, "
-        f"ten scenes for each of the {config['idnn']['folds']} folds of idnn.folds.",
+        f"ten scenes for each of the {idnn['folds']} folds of idnn.folds.",
     )
     share = config["dataset"]["test_share"]
     for law, number in scenes["number"].items():
@@ -209,6 +300,15 @@ def _check_physics(config: dict) -> None:
         scenes["number"][law] > 0,
         f"figures.radial_law is {law}, but must be a law that scenes.number draws scenes of.",
     )
+    trained_on = {"idnn.laws": laws} | {
+        f"idnn.laws_of.{model}": own for model, own in idnn["laws_of"].items()
+    }
+    for key, own in trained_on.items():
+        for law in own:
+            _require(
+                scenes["number"][law] > 0,
+                f"{key} names {law}, but must name laws that scenes.number draws scenes of.",
+            )
     low, high = figures["fit_frequencies"]
     _require(
         low < high,
@@ -220,6 +320,7 @@ def _check_physics(config: dict) -> None:
         f"sedimentation.properties.particle_density is {particle:g} kg/m³, but must be above "
         f"sedimentation.properties.fluid_density, which is {fluid:g} kg/m³.",
     )
+    _check_stokes_flow(settle)
     studies = config["studies"]
     most, fewest = max(studies["neighbours"]), min(settle["particles"])
     _require(
@@ -239,25 +340,113 @@ def _check_physics(config: dict) -> None:
         _require_multiple("studies.duration", studies["duration"], "one of studies.steps", step)
     latest = studies["duration"] - STEADY_STEPS * max(studies["steps"])
     _require(
+        latest >= 0,
+        f"studies.duration is {studies['duration']:g} response times, but must be at least "
+        f"{STEADY_STEPS} of the largest of studies.steps, which is {max(studies['steps']):g}.",
+    )
+    _require(
         studies["statistics_from"] <= latest,
         f"studies.statistics_from is {studies['statistics_from']:g} response times, but must be at "
         f"most {latest:g}, so that {STEADY_STEPS} of the largest of studies.steps follow.",
     )
     _check_times("sedimentation", settle, "response")
     _check_times("sedimentation.long", settle["long"], "spreading")
+    _check_frequencies(config)
+    _check_start_file(config)
 
 
 def _check_times(section: str, times: dict, unit: str) -> None:
     step, duration = times["step"], times["duration"]
     for key in ("duration", "save_every"):
         _require_multiple(f"{section}.{key}", times[key], f"{section}.step", step, unit)
-    latest = duration - max(times["save_every"], STEADY_STEPS * step)
+    _require(
+        STEADY_STEPS * step <= duration,
+        f"{section}.duration is {duration:g} {unit} times, but must be at least {STEADY_STEPS} of "
+        f"{section}.step, which is {step:g}.",
+    )
+    _require(
+        STEADY_FRAMES * times["save_every"] <= duration,
+        f"{section}.save_every is {times['save_every']:g} {unit} times, but must be at most "
+        f"{duration / STEADY_FRAMES:g}, so that {STEADY_FRAMES} frames, which a spectrum needs, "
+        f"follow the first within {section}.duration, which is {duration:g}.",
+    )
+    latest = duration - max(STEADY_FRAMES * times["save_every"], STEADY_STEPS * step)
     _require(
         times["statistics_from"] <= latest,
         f"{section}.statistics_from is {times['statistics_from']:g} {unit} times, but must be at "
-        f"most {latest:g}, so that {STEADY_STEPS} steps and a frame follow within "
+        f"most {latest:g}, so that {STEADY_STEPS} steps and {STEADY_FRAMES} frames follow within "
         f"{section}.duration, which is {duration:g}.",
     )
+
+
+def _check_stokes_flow(settle: dict) -> None:
+    """Refuse cases that are no Stokes flow."""
+    properties = Properties(**settle["properties"])
+    for multiple in sorted({1.0, *settle["galileo"]["multiples"]}):
+        change = settle["galileo"]["change"]
+        case = properties if multiple == 1 else properties.with_galileo_multiple(multiple, change)
+        _require(
+            case.galileo <= MOST_GALILEO,
+            f"sedimentation.properties give a Galileo number of {case.galileo:.3g}"
+            f"{'' if multiple == 1 else f' at {multiple:g} of sedimentation.galileo.multiples'}, "
+            f"but must, in SI units, give at most {MOST_GALILEO:g}: beyond it the flow around a "
+            "particle is no Stokes flow.",
+        )
+
+
+def _check_frequencies(config: dict) -> None:
+    """Refuse frequencies of which the spectra of a run resolve too few to fit a slope."""
+    settle = config["sedimentation"]
+    low, high = config["figures"]["fit_frequencies"]
+    # Spectra of single particles have a value a step, those of clouds one a frame.
+    sampled = [
+        ("sedimentation.step", settle["step"], settle["duration"] - settle["statistics_from"])
+    ]
+    lasting = settle["long"]["particles"]
+    for case in plan.largest_cases(config, lasting):
+        times = plan.schedule(config, case)
+        key = f"sedimentation.{'long.' if lasting else ''}save_every"
+        window = times["duration"] - plan.statistics_from(config, case)
+        sampled.append((key, times["save_interval"], window))
+    for key, interval, window in sampled:
+        samples = math.floor(window / interval * (1 + 1e-9)) + 1
+        # Of Welch's method, the coarser one.
+        resolution = 1 / (interval * min(max(SHORTEST_SEGMENT, samples // 8), samples))
+        top = min(high, HIGHEST_FITTED / interval)
+        first, last = math.ceil(low / resolution), math.floor(top / resolution * (1 + 1e-9))
+        lines = range(max(first, 1), last + 1)
+        # Those of a value a step are averaged in bins before the fit.
+        fine = key == "sedimentation.step"
+        values = {
+            math.floor(BINS_PER_DECADE * math.log10(line)) if fine else line for line in lines
+        }
+        _require(
+            len(values) >= FITTED_VALUES,
+            f"figures.fit_frequencies is {low:g} to {high:g}, but must hold at least "
+            f"{FITTED_VALUES} of the frequencies that {key} resolves where the state is steady: "
+            f"multiples of {resolution:.3g} up to {HIGHEST_FITTED / interval:.3g} per response "
+            "time.",
+        )
+
+
+def _check_start_file(config: dict) -> None:
+    """Refuse a start that is a folder, or one file for clouds that differ."""
+    pattern = config["sedimentation"]["start_file"]
+    if not pattern:
+        return
+    found = plan.cases(config)
+    clouds = {(case.particles, case.volume_fraction) for case in found.values()}
+    _require(
+        len(clouds) == 1 or "{case}" in pattern,
+        f"sedimentation.start_file is {pattern}, one file for {len(clouds)} clouds of different "
+        "numbers of particles or volume fractions, but must have {case} in its name.",
+    )
+    for case in found:
+        file = plan.start_file(config, case)
+        _require(
+            not Path(str(file)).is_dir(),
+            f"sedimentation.start_file names {file}, a folder, but must name a file.",
+        )
 
 
 def _require_multiple(key: str, value: float, of: str, step: float, unit: str = "response") -> None:
@@ -273,5 +462,17 @@ def _require(condition: bool, sentence: str) -> None:
         raise ConfigurationError(sentence)
 
 
+def main(files: Iterable[str]) -> None:
+    """Check files of settings, or print the table of keys."""
+    found = [read_file(file) for file in files]
+    if not found:
+        print(reference())
+    for settings in found:
+        print(f"This campaign takes about {cost(configure(settings))}.")
+
+
 if __name__ == "__main__":
-    print(reference())
+    try:
+        main(sys.argv[1:])
+    except ConfigurationError as error:
+        sys.exit(f"Configuration: {error}")

@@ -2,13 +2,15 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 
+from dustfall.analysis import spectra
 from dustfall.forces.registry import trained_models
 from dustfall.scenes import LAWS
 from workflow import configuration
-from workflow.configuration import ConfigurationError, configure, keys, load_schema
+from workflow.configuration import ConfigurationError, configure, keys, load_schema, read_file
 from workflow.readers import read_by, readers
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -120,10 +122,10 @@ REFUSED = [
     ("sed", 3, "sed (set to 3) is not a key (did you mean seed?); allowed are seed, scenes,"),
     ("scenes.shard_siz", 3, "scenes.shard_siz (set to 3) is not a key (did you mean shard_size?)"),
     ("scenes.number.cube", 3, "scenes.number.cube (set to 3) is not a key"),
-    ("seed", "many", "seed is many, but must be a whole number at least 0."),
-    ("seed", -1, "seed is -1, but must be a whole number at least 0."),
-    ("seed", 1.5, "seed is 1.5, but must be a whole number at least 0."),
-    ("seed", True, "seed is True, but must be a whole number at least 0."),
+    ("seed", "many", "seed is many, but must be a whole number at least 0 and at most"),
+    ("seed", -1, "seed is -1, but must be a whole number at least 0 and at most"),
+    ("seed", 1.5, "seed is 1.5, but must be a whole number at least 0 and at most"),
+    ("seed", True, "seed is True, but must be a whole number at least 0 and at most"),
     ("scenes", None, "scenes is empty, but must be a section with the keys number,"),
     ("scenes", [1], "scenes is [1], but must be a section with the keys number,"),
     ("scenes.phi_max", 0.7, "scenes.phi_max is 0.7, but must be a number at least 1e-12 and at"),
@@ -140,15 +142,48 @@ REFUSED = [
     ("sedimentation.particles", [1000, 5], "particles[1] is 5, but must be a whole number at"),
     ("sedimentation.volume_fractions", [0.5], "volume_fractions[0] is 0.5, but must be a number"),
     ("sedimentation.galileo.particles", 3, "galileo.particles is 3, but must be a whole number"),
-    ("sedimentation.properties.viscosity", 0, "viscosity is 0, but must be a number above 0."),
+    ("sedimentation.properties.viscosity", 0, "viscosity is 0, but must be a number above 0 and"),
     ("sedimentation.properties.particle_density", 1.0, "is 1 kg/m³, but must be above"),
     ("sedimentation.model", "idn", "sedimentation.model is idn, but must be one of isolated,"),
-    ("sedimentation.statistics_from", 100, "is 100 response times, but must be at most 98"),
+    ("sedimentation.statistics_from", 100, "is 100 response times, but must be at most 88"),
     ("sedimentation.duration", 100.01, "duration is 100.01 response times, but must be a multiple"),
     ("sedimentation.save_every", 0.07, "save_every is 0.07 response times, but must be a multiple"),
     ("scenes.number.contact", 3, "scenes.number.contact is 3, but must be 0 or at least 6, so"),
     ("idnn.laws", ["cube"], "idnn.laws[0] is cube, but must be one of uniform, ball, contact."),
     ("figures.fit_frequencies", [2, 1], "fit_frequencies is 2 to 1, but must be the lower to"),
+    (
+        "figures.fit_frequencies",
+        [2, 3],
+        "fit_frequencies is 2 to 3, but must hold at least 3 of the",
+    ),
+    ("figures.fit_frequencies", [0.2, 0.25], "but must hold at least 3 of the frequencies that"),
+    ("sedimentation.save_every", 200, "save_every is 200 response times, but must be at most 8.33"),
+    (
+        "sedimentation.duration",
+        1,
+        "sedimentation.duration is 1 response times, but must be at least",
+    ),
+    ("studies.duration", 1, "studies.duration is 1 response times, but must be at least 20 of"),
+    (
+        "sedimentation.properties.diameter",
+        25,
+        "diameter is 25, but must be a number above 0 and at",
+    ),
+    (
+        "sedimentation.properties.diameter",
+        1e-3,
+        "give a Galileo number of 5.01e+03, but must, in SI",
+    ),
+    (
+        "sedimentation.galileo.multiples",
+        [1, 20],
+        "of 1.56 at 20 of sedimentation.galileo.multiples",
+    ),
+    ("sedimentation.start_file", "start.nc", "one file for 13 clouds of different numbers of"),
+    ("idnn.layers", ["99999999999/10"], 'idnn.layers[0] is "99999999999/10", but must be hidden'),
+    ("scenes.number", {"ball": 0}, "idnn.laws_of.anchored names ball, but must name laws that"),
+    ("seed", 10**400, "seed is a number of very many digits, but must be a whole number"),
+    ("seed", 1e300, "seed is 1e+300, but must be a whole number at least 0 and at most"),
     ("figures.fit_frequencies", [1], "figures.fit_frequencies is [1.0], but must be two numbers"),
 ]
 
@@ -157,6 +192,62 @@ def test_figures_need_scenes_of_their_law():
     settings = {"scenes": {"number": {"ball": 0}}, "figures": {"radial_law": "ball"}}
     with pytest.raises(ConfigurationError, match=r"figures\.radial_law is ball, but must be a law"):
         configure(settings)
+
+
+FILES = {
+    "seed: 1\nscenes: {}\nseed: 2\n": "sets seed twice, in line 1 and in line 3.",
+    "scenes:\n  number:\n    ball: 1\n    ball: 2\n": "sets ball twice, in line 3 and in line 4.",
+    "seed: 1\nscenes: {number: [\n": ", line 3 is no YAML: ",
+    "seed: 1\n\tscenes: 2\n": ", line 2 is no YAML: ",
+    "- 1\n": "must hold sections and keys, like: seed: 1.",
+    "a: &b [1]\nc: *b\n": ", line 1: an alias repeats this part, but is not allowed.",
+    "a: &b [*b]\n": ", line 1: an alias repeats this part, but is not allowed.",
+    "__use_yte__: true\nseed: ?1 + 1\n": ", line 1: __use_yte__ has Snakemake run what the file",
+    "a: !!python/object/apply:os.system [exit]\n": ", line 1 is no YAML: could not determine a",
+    "[" * 5000: "cannot be read as YAML: ",
+    "seed: " + "9" * 5000: "cannot be read as YAML: ",
+    "\udcff": "is no text in UTF-8: ",
+    "#" * 2_000_000: "has 2000000 bytes, allowed are 1000000.",
+}
+
+
+@pytest.mark.parametrize("content", FILES, ids=range(len(FILES)))
+def test_files_that_are_no_settings_are_refused_with_file_and_line(tmp_path, content):
+    path = tmp_path / "mine.yaml"
+    path.write_bytes(content.encode("utf-8", "surrogateescape"))
+    with pytest.raises(ConfigurationError) as refusal:
+        read_file(path)
+    assert str(refusal.value).startswith(f"{path}")
+    assert FILES[content] in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_missing_file_of_settings_is_told_in_one_sentence(tmp_path):
+    for path in (tmp_path / "none.yaml", tmp_path):
+        with pytest.raises(ConfigurationError, match="is no file"):
+            read_file(path)
+
+
+def test_files_of_settings_are_read_as_yaml_reads_them():
+    for path in (ROOT / "config").glob("*.yaml"):
+        assert read_file(path) == yaml.safe_load(path.read_text())
+
+
+def test_frequencies_are_those_that_the_spectra_resolve():
+    for name in ("HIGHEST_FITTED", "SHORTEST_SEGMENT", "BINS_PER_DECADE"):
+        assert getattr(configuration, name) == getattr(spectra, name)
+    # The fewest frames that are allowed give a slope by both methods.
+    values = np.random.default_rng(1).normal(size=configuration.STEADY_FRAMES + 1)
+    for method in ("periodogram", "welch"):
+        frequency, density = spectra.power_spectral_density(values, 1.0, method)
+        limits = (0.0, spectra.HIGHEST_FITTED)
+        assert spectra.spectral_slope(frequency[1:], density[1:], limits=limits).slope
+
+
+def test_a_start_that_is_a_folder_is_refused(tmp_path):
+    (tmp_path / "n1000_phi1e-08_ga1").mkdir()
+    with pytest.raises(ConfigurationError, match=r"start_file names .*_ga1, a folder, but must"):
+        configure(nested("sedimentation.start_file", f"{tmp_path}/{{case}}"))
 
 
 @pytest.mark.parametrize(("key", "value", "sentence"), REFUSED)
