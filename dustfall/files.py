@@ -2,6 +2,7 @@
 
 import errno
 import os
+import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -43,12 +44,9 @@ def atomic(path: str | os.PathLike) -> Iterator[Path]:
 def _is_full(path: Path) -> bool:
     """Whether the disk has no room for a file like `path`, as far as it was written, again."""
     try:
-        with open(path, "r+b") as file:
-            size = os.fstat(file.fileno()).st_size
-            os.posix_fallocate(file.fileno(), size, max(size, LEAST_ROOM))
-    except OSError as error:
-        return error.errno in (errno.ENOSPC, errno.EDQUOT)
-    return False
+        return shutil.disk_usage(path.parent).free < max(path.stat().st_size, LEAST_ROOM)
+    except OSError:
+        return False
 
 
 def remove_leftovers(path: str | os.PathLike) -> None:

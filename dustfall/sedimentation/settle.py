@@ -1,6 +1,7 @@
 """A run that lasts: frames and series on disk, checkpoints, signals. Its physics is in `state`."""
 
 import hashlib
+import os
 import signal
 import tempfile
 import threading
@@ -144,8 +145,8 @@ def settle(
 
     Raises
     ------
-    ValueError : the checkpoint is of a run with other settings, the closure is made for another
-        step, or the flow is no Stokes flow (see `Properties.check_stokes_flow`).
+    ValueError : the checkpoint is of a run with other settings, or another run is at work on it;
+        the closure is made for another step; or the flow is no Stokes flow (see `Properties.check_stokes_flow`).
     FloatingPointError : the drag is not finite, or a particle has flown off.
     SystemExit : SIGTERM or Ctrl-C came, and the state was saved.
     """
@@ -319,9 +320,34 @@ def _working_folder(checkpoint: Checkpoint | None, output: Output) -> Iterator[P
     else:
         folder = Path(checkpoint.folder)
         folder.mkdir(parents=True, exist_ok=True)
-        yield folder
+        with _alone_in(folder):
+            yield folder
         with suppress(OSError):  # someone else's file in there stays
             folder.rmdir()
+
+
+@contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """Keep other runs out of a folder for as long as this process lives, however it ends.
+
+    Raises ValueError where another one is at work there. Not every system has such locks.
+    """
+    try:
+        import fcntl
+    except ModuleNotFoundError:
+        yield
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise ValueError(f"another run is at work in {folder}: let it end first") from None
+        except OSError:
+            pass
+        yield
+    finally:
+        os.close(handle)
 
 
 @contextmanager

@@ -414,6 +414,18 @@ def test_a_checkpoint_of_another_kind_heals_like_a_damaged_one(tmp_path, undistu
     assert_same_files(tmp_path, undisturbed)
 
 
+def test_two_runs_at_once_are_refused(tmp_path, undisturbed):
+    checkpoint = tmp_path / "checkpoint"
+
+    def begin_another(done, total):
+        if done == 7:
+            with pytest.raises(ValueError, match=r"another run is at work in .*checkpoint"):
+                run(tmp_path, checkpoint=checkpoint)
+
+    run(tmp_path, checkpoint=checkpoint, checkpoint_interval=0.0, progress=begin_another)
+    assert_same_files(tmp_path, undisturbed)
+
+
 def test_records_damaged_while_a_run_goes_on_are_told_and_healed(tmp_path, undisturbed):
     checkpoint = tmp_path / "checkpoint"
 

@@ -6,6 +6,9 @@ from dustfall.sedimentation import Schedule
 from workflow import plan
 from workflow.configuration import configure
 
+UNIFORM = {"idnn": {"laws_of": {"anchored": ["uniform"]}}}
+"""What a campaign sets that has scenes of this law alone."""
+
 FIGURES = [
     "force_scatter",
     "force_pdf",
@@ -91,7 +94,7 @@ def test_exports_is_a_target_with_every_case(project):
 @pytest.mark.parametrize(("number", "size"), [(120, 40), (121, 40), (119, 40), (120, 1000)])
 def test_shards_hold_every_scene_once(number, size):
     numbers = {"uniform": number, "ball": 7, "contact": 0}
-    config = configure({"scenes": {"number": numbers, "shard_size": size}})
+    config = configure({"scenes": {"number": numbers, "shard_size": size}} | UNIFORM)
     scenes = {"uniform": [], "ball": []}
     for name in plan.shards(config):
         law, shard = name.split("-")
@@ -103,7 +106,7 @@ def test_shards_hold_every_scene_once(number, size):
 
 def test_more_scenes_leave_the_full_shards_as_they_are():
     few, many = (
-        configure({"scenes": {"number": {"uniform": n, "ball": 0, "contact": 0}}})
+        configure({"scenes": {"number": {"uniform": n, "ball": 0, "contact": 0}}} | UNIFORM)
         for n in (4000, 4001)
     )
     assert plan.shards(many)[:2] == plan.shards(few)
