@@ -3,7 +3,10 @@
 import sys
 import time
 
-from tqdm import tqdm
+from dustfall.extras import extra
+
+with extra("files"):
+    from tqdm import tqdm
 
 
 class Progress:

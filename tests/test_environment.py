@@ -1,6 +1,7 @@
 """Solving and prediction work where numpy, numba, scipy and safetensors are all there is."""
 
 import json
+import re
 import subprocess
 import sys
 import tomllib
@@ -84,6 +85,38 @@ for room in {list(ROOMS)}:
     with open(ROOT / "pyproject.toml", "rb") as file:
         extras = tomllib.load(file)["project"]["optional-dependencies"]
     assert set(ROOMS.values()) <= set(extras)
+
+
+def test_the_command_line_solves_predicts_and_names_missing_extras(bare_environment, tmp_path):
+    (tmp_path / "c.csv").write_text("0,0,0\n0,1.5,0\n")
+    (tmp_path / "n.csv").write_text("2,0,0,0,3,0,0,0,4,-5,0,0,0,-6,0\n")
+    commands = [
+        "forces {0}/c.csv -o {0}/forces.npy",
+        "predict {0}/n.csv -o {0}/predicted.csv",
+        "forces {0}/c.csv -o {0}/forces.h5",
+        "settle --particles 9 --phi 1e-3 -o {0}/run.nc",
+        "train {0}/n.csv -o {0}/model.safetensors",
+        "export anchored --to onnx -o {0}/model.onnx",
+        "export {0}/run.nc --to vtkhdf -o {0}/run.vtkhdf",
+        "view {0}/run.nc -o {0}/run.gif",
+    ]
+    code = f"""
+from contextlib import redirect_stderr
+from io import StringIO
+from dustfall.cli import main
+result = []
+for command in {commands}:
+    with redirect_stderr(StringIO()) as told:
+        status = main([part.format({str(tmp_path)!r}) for part in command.split()])
+    result.append([status, told.getvalue()])"""
+    (solved, _), (predicted, _), *failed = run(bare_environment, code)
+    assert solved == predicted == 0
+    forces = np.load(tmp_path / "forces.npy")["force"]
+    np.testing.assert_allclose(forces[0], forces[1], atol=24.0 * 1e-4)
+    extras = ["files", "files", "train", "onnx", "files", "figures"]
+    for (status, told), extra in zip(failed, extras, strict=True):
+        assert status == 2
+        assert re.fullmatch(rf"dustfall \w+: .* pip install 'dustfall\[{extra}\]'\n", told), told
 
 
 @pytest.mark.parametrize("room", ["forces", "stokes", "suspension.periodic"])

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from dustfall.extras import extra
 from dustfall.files import atomic
 from dustfall.forces.features import FADING, KINDS
 from dustfall.forces.formula import Formula
@@ -199,8 +200,9 @@ def export_onnx(model: LearnedModel, path) -> None:
     add, in the frame of the model, to its baseline. Frame and baseline are geometry and not in it.
     The model's header is the metadata "header", as JSON. Needs the package onnx.
     """
-    import onnx
-    from onnx import TensorProto, helper
+    with extra("onnx"):
+        import onnx
+        from onnx import TensorProto, helper
 
     def value(name, *shape):
         return helper.make_tensor_value_info(name, TensorProto.DOUBLE, ["m", *shape])

@@ -3,11 +3,14 @@
 from collections.abc import Callable
 from pathlib import Path
 
-import h5py
 import numpy as np
 
+from dustfall.extras import extra
 from dustfall.files import atomic
 from dustfall.sedimentation.trajectory import open_run
+
+with extra("files"):
+    import h5py
 
 VERSION = (2, 0)
 """Of the VTKHDF format: the first with polygonal data that change in time (ParaView 5.12)."""

@@ -14,6 +14,7 @@ from dustfall.sedimentation.trajectory import open_run
 from dustfall.spheres import checked_numbers
 from dustfall.suspension.cube import folded
 from dustfall.streams import Purpose, stream
+from dustfall.tables import Quantity, read_table
 from dustfall.units import CONTACT
 
 SATURATION = 0.38
@@ -38,6 +39,12 @@ MOST_IN_A_CELL = 8
 
 START_VELOCITY = {"rest": 0.0, "stokes": -1.0}
 """Vertical velocity at the start [v_s]."""
+
+START_TABLE = {
+    "position": Quantity((3,), "d_p", "unwrapped positions, z upwards"),
+    "velocity": Quantity((3,), "v_s", "velocities, z upwards", required=False),
+}
+"""What a table holds that a run starts from."""
 
 
 def random_start(
@@ -122,14 +129,16 @@ def random_positions(rng: np.random.Generator, particles: int, volume_fraction: 
     return position[sort_by_cell(position, length)[1]]
 
 
-def read_start(path: str | Path, particles: int, volume_fraction: float):
-    """Read where a run starts: the last frame of a trajectory (.nc), or a table of plain text.
+def read_start(path: str | Path, particles: int | None, volume_fraction: float):
+    """Read where a run starts: the last frame of a trajectory (.nc), or a table.
 
     A trajectory follows the AMBER convention, as those of this package do, with coordinates in d_p
     and, where it has them, velocities in v_s; its cube is the one that `particles` and
-    `volume_fraction` give. A table has one particle a line: x y z in d_p, or x y z v_x v_y v_z with
-    velocities in v_s; what follows a # is a comment. Spheres of a table may not overlap; those of a
-    run have moved as its closure said, which may be into each other.
+    `volume_fraction` give; as many particles as there are, if `particles` is None. A table (csv,
+    npy, h5, see `dustfall.tables`) has x, y, z in d_p and, if any, velocity_x, velocity_y,
+    velocity_z in v_s. Any other file is text, one particle a line: x y z, or x y z v_x v_y v_z;
+    what follows a # is a comment. Spheres of a table may not overlap; those of a run have moved as
+    its closure said, which may be into each other.
 
     Returns
     -------
@@ -141,30 +150,33 @@ def read_start(path: str | Path, particles: int, volume_fraction: float):
     ValueError : the file is damaged or holds something else, another number of particles, another
         cube, values that are missing or too large, spheres that overlap.
     """
-    path, length = Path(path), box_length(particles, volume_fraction)
+    path = Path(path)
     if path.exists() and not path.is_file():
         raise ValueError(f"{path} is no file: a trajectory (.nc) or a table of text is needed")
     if path.suffix == ".nc":
         positions, velocities = _last_frames(path, particles, volume_fraction)
+    elif path.suffix in (".csv", ".npy", ".h5"):
+        columns = read_table(path, START_TABLE)
+        positions, velocities = columns["position"], columns.get("velocity")
     else:
         table = _table(path, particles)
         positions, velocities = table[:, :3], table[:, 3:] if table.shape[1] == 6 else None
-    if len(positions) != particles:
+    if particles not in (None, len(positions)):
         raise ValueError(f"{path} holds {len(positions)} particles: {particles} are needed")
     try:
         start_from(positions, volume_fraction, "rest" if velocities is None else velocities)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
     if path.suffix != ".nc":
-        _refuse_overlaps(path, positions, length)
+        _refuse_overlaps(path, positions, box_length(len(positions), volume_fraction))
     return positions, velocities
 
 
-def _table(path: Path, particles: int) -> np.ndarray:
+def _table(path: Path, particles: int | None) -> np.ndarray:
     """A table of 3 or 6 columns."""
     with open(path, "rb") as file:
         size = file.seek(0, os.SEEK_END)
-    if size > LONGEST_LINE * (particles + 100):
+    if particles is not None and size > LONGEST_LINE * (particles + 100):
         raise ValueError(
             f"{path} has {size} bytes: a table of {particles} particles has at most "
             f"{LONGEST_LINE} a line"
@@ -177,7 +189,7 @@ def _table(path: Path, particles: int) -> np.ndarray:
         words = str(error).split("; use `usecols`")[0]
         raise ValueError(f"{path} is no table of numbers: {words}") from None
     if table.size == 0:
-        raise ValueError(f"{path} holds no particle: {particles} are needed")
+        raise ValueError(f"{path} holds no particle: {particles or 'some'} are needed")
     if table.shape[1] not in (3, 6):
         raise ValueError(
             f"{path} has {table.shape[1]} columns: 3 or 6 are needed, x y z [v_x v_y v_z]"
@@ -185,10 +197,14 @@ def _table(path: Path, particles: int) -> np.ndarray:
     return table
 
 
-def _last_frames(path: Path, particles: int, volume_fraction: float):
+def _last_frames(path: Path, particles: int | None, volume_fraction: float):
     """Positions, and velocities or None, of the last frame of a trajectory in float64."""
-    length = box_length(particles, volume_fraction)
     with open_run(path) as file:
+        if particles is None:
+            if "atom" not in file.dimensions:
+                raise ValueError(f"{path} has no dimension atom: it is no trajectory")
+            particles = file.dimensions["atom"].size
+        length = box_length(particles, volume_fraction)
         lengths = _last_frame(path, file, "cell_lengths", "d_p", (3,))
         if lengths is not None and not np.allclose(lengths, length, rtol=1e-6):
             raise ValueError(
