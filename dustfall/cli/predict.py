@@ -7,7 +7,7 @@ SUMMARY = "force on a sphere among its neighbours, by a force model"
 DESCRIPTION = """\
 in:  x1, y1, z1, x2, ... [d_p]: the neighbours of the sphere of each row, as seen from it, in any
      order, in the frame of the flow: x spanwise, y streamwise, z vertical; npy: (m, k, 3)
-out: force_x, force_y, force_z [Re_p c_D] on that sphere, row by row"""
+out: the same, and force_x, force_y, force_z [Re_p c_D] on that sphere"""
 
 EXAMPLES = """\
   dustfall predict neighbours.csv
@@ -31,5 +31,6 @@ def run(options) -> None:
     model = models.named_model(options.model)
     seen = {"neighbours": Quantity((None, 3), "d_p", "neighbours as seen from the sphere")}
     force = {"force": Quantity((3,), "Re_p c_D", "force on the sphere at the origin")}
-    predicted = model.predict(read_table(options.neighbours, seen)["neighbours"])
-    write_table(options.output, force, {"force": predicted})
+    neighbours = read_table(options.neighbours, seen)["neighbours"]
+    values = {"neighbours": neighbours, "force": model.predict(neighbours)}
+    write_table(options.output, {**seen, **force}, values)
