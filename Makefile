@@ -6,18 +6,20 @@ PYTHON ?= python3
 
 VENV := .venv
 STAMP := $(VENV)/requirements.sha256
+PIP_INSTALL := $(VENV)/bin/python -m pip install --quiet --disable-pip-version-check
+TORCH_NEEDS := filelock fsspec networkx sympy
 GMSH_LIBRARIES := libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 libgomp1
 CAN_INSTALL := [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null
 APT_INSTALL := apt-get update && apt-get install -y --no-install-recommends
 
-.PHONY: run test openfoam openfoam-test environment gmsh-libraries clean-environment
+.PHONY: run test openfoam openfoam-test tools-test environment lock gmsh-libraries clean-environment
 
 run: environment
 	@$(VENV)/bin/python -m workflow.configuration $(CONFIG)
 	$(VENV)/bin/snakemake --configfile $(CONFIG) -- all
 
 test: environment
-	$(VENV)/bin/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m "not openfoam"
+	$(VENV)/bin/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m "not openfoam and not tools"
 
 openfoam:
 	openfoam/build.sh
@@ -25,7 +27,12 @@ openfoam:
 openfoam-test: environment openfoam
 	$(VENV)/bin/python -m pytest tests/openfoam
 
-# Made anew when it is missing, or when requirements.txt is not the one that it was made from.
+# The tools come on top of the environment, which they leave as it is: its versions are pinned.
+tools-test: environment
+	$(PIP_INSTALL) -c requirements.txt -r tests/tools/requirements.txt
+	$(VENV)/bin/python -m pytest tests/tools
+
+# Made anew when it is missing, or when the requirements are not those that it was made from.
 environment:
 	@{ sha256sum --check --status $(STAMP) && $(VENV)/bin/python -c ''; } 2>/dev/null \
 		|| $(MAKE) --no-print-directory $(VENV)/new
@@ -43,8 +50,15 @@ $(VENV)/new:
 		echo "$(PYTHON) makes no virtual environment. On Debian or Ubuntu that comes by:" >&2; \
 		echo "  sudo sh -c '$(APT_INSTALL) python3-venv'" >&2; \
 		exit 1; }
-	$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r requirements.txt
-	@sha256sum requirements.txt > $(STAMP)
+	$(PIP_INSTALL) --require-hashes -r requirements.lock
+	$(PIP_INSTALL) -r requirements.txt
+	@sha256sum requirements.txt requirements.lock > $(STAMP)
+
+# For all platforms and Pythons. torch, and the CUDA libraries of some of its builds, are left out.
+lock: environment
+	{ grep -v '^torch' requirements.txt; printf '%s\n' $(TORCH_NEEDS); } | \
+		$(VENV)/bin/uv pip compile - --universal --python-version 3.11 --generate-hashes --quiet \
+		--no-annotate --custom-compile-command "make lock" --output-file requirements.lock
 
 # gmsh's wheel needs X and GL libraries of the system, which no wheel brings.
 gmsh-libraries:

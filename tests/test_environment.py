@@ -119,6 +119,25 @@ for command in {commands}:
         assert re.fullmatch(rf"dustfall \w+: .* pip install 'dustfall\[{extra}\]'\n", told), told
 
 
+def pins(file: str) -> dict[str, set[str]]:
+    """Versions of each package of a file of requirements; a lock may have one for each Python."""
+    found: dict[str, set[str]] = {}
+    for line in (ROOT / file).read_text().splitlines():
+        if pin := re.match(r"([\w.-]+)(?:\[\w+\])?==([^\s;]+)", line):
+            name = re.sub(r"[-_.]+", "-", pin[1]).lower()
+            found.setdefault(name, set()).add(pin[2])
+    return found
+
+
+def test_the_lock_holds_what_is_required_with_hashes():
+    locked, required = pins("requirements.lock"), pins("requirements.txt")
+    assert "torch" not in locked
+    differing = {name for name in required if required[name] != locked.get(name)}
+    assert differing == {"torch"}, "make lock"
+    lines = (ROOT / "requirements.lock").read_text().replace("\\\n", "").splitlines()
+    assert all("--hash=sha256:" in line for line in lines if not line.startswith("#"))
+
+
 @pytest.mark.parametrize("room", ["forces", "stokes", "suspension.periodic"])
 def test_solving_and_prediction_load_neither_their_tools_nor_other_rooms(room):
     code = f"import json, sys\nimport dustfall.{room}\nprint(json.dumps(list(sys.modules)))"
