@@ -11,8 +11,9 @@ models:       openfoam   a dictionary for the plugin
               json       the same for C++, C and Fortran
               onnx       the networks alone (extra onnx)
 trajectories: vtkhdf     ParaView 5.12 and later, VTK
-              xdmf       the same with a file .xdmf beside it, which ParaView 5.11 opens too
-              amber      NetCDF-3 in angstrom and picoseconds: MDAnalysis, VMD, OVITO"""
+              pvd        any ParaView; a folder of files beside it, one a frame
+              amber      NetCDF-3 in angstrom and picoseconds: MDAnalysis, OVITO
+The trajectories of `dustfall settle` themselves open in OVITO and xarray."""
 
 EXAMPLES = """\
   dustfall export model.safetensors --to openfoam -o constant/forceModel
@@ -20,7 +21,7 @@ EXAMPLES = """\
   dustfall export run.nc --to vtkhdf -o run.vtkhdf --positions unwrapped --units si"""
 
 MODELS = ("openfoam", "json", "onnx")
-TRAJECTORIES = ("vtkhdf", "xdmf", "amber")
+TRAJECTORIES = ("vtkhdf", "pvd", "amber")
 
 
 def add_arguments(parser) -> None:
@@ -35,7 +36,7 @@ def add_arguments(parser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--units", choices=("run", "si"),
-        help="of vtkhdf and xdmf: d_p, tau, v_s as in the run (default), or m, s, m/s",
+        help="of vtkhdf and pvd: d_p, tau, v_s as in the run (default), or m, s, m/s",
     )  # fmt: skip
 
 
@@ -68,12 +69,14 @@ def _export_model(options) -> None:
 
 def _export_trajectory(options) -> None:
     from dustfall.progress import Progress
-    from dustfall.sedimentation.export import export_vtkhdf
+    from dustfall.sedimentation.export import export_amber, export_pvd, export_vtkhdf
 
-    with Progress("export", "frames") as progress:
-        export_vtkhdf(
-            options.source,
-            options.output,
-            options.positions != "unwrapped",
-            progress=progress.report,
-        )
+    folded = options.positions != "unwrapped"
+    with Progress(f"export {options.source}", "frames") as progress:
+        if options.to == "amber":
+            if options.units is not None:
+                raise ValueError("--units means nothing to amber, which has units of its own")
+            export_amber(options.source, options.output, folded, progress.report)
+        else:
+            export = export_vtkhdf if options.to == "vtkhdf" else export_pvd
+            export(options.source, options.output, folded, options.units == "si", progress.report)

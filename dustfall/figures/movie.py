@@ -1,6 +1,7 @@
 """A short movie of the settling cloud, coloured by velocity."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
@@ -8,6 +9,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 from PIL import Image
 
+from dustfall.extras import extra
 from dustfall.figures.style import new_figure, phi_label, require, styled
 from dustfall.files import atomic
 
@@ -41,20 +43,27 @@ def save_movie(
     milliseconds=120,
     progress: Callable[[int, int], None] | None = None,
 ) -> None:
-    """Write a GIF of a slab of the cloud, seen from a side, in the frame of its mean motion.
+    """Write a GIF or MP4 of a slab of the cloud, seen from a side, in the frame of its mean motion.
 
     Parameters
     ----------
     trajectory : coordinates [d_p] and velocities [v_s] (frame, atom, spatial), time (frame) [tau],
         cell_lengths (frame, cell_spatial) [d_p]; attributes n and volume_fraction
-    path : of the GIF, written atomically
+    path : of the movie, .gif or .mp4 (H.264), written atomically
     frames : pictures at most, evenly spaced over the run from the first moving frame on
     milliseconds : that a picture is shown
 
     Raises
     ------
-    ValueError : fewer than two frames in the trajectory, or fewer than two pictures asked for.
+    ValueError : another suffix, fewer than two frames in the trajectory, or fewer than two pictures
+        asked for.
     """
+    write = {".gif": _write_gif, ".mp4": _write_mp4}.get(Path(path).suffix)
+    if write is None:
+        raise ValueError(f"{path}: a movie has the suffix .gif or .mp4")
+    lacking = {"time", "coordinates", "velocities", "cell_lengths"} - set(trajectory.variables)
+    if lacking:
+        raise ValueError(f"there is no {', '.join(sorted(lacking))} in what is to be a trajectory")
     total = trajectory.sizes["frame"]
     if total < 2 or frames < 2:
         raise ValueError(f"{total} frames and {frames} pictures: a movie needs at least 2")
@@ -67,18 +76,35 @@ def save_movie(
         pictures.append(_picture(cloud_slice(trajectory.isel(frame=k)), limits, trajectory.attrs))
         if progress:
             progress(done, len(chosen))
+    with atomic(path) as temporary:
+        write(temporary, pictures, milliseconds)
+
+
+def _write_gif(path: Path, pictures: list[Image.Image], milliseconds: float) -> None:
     # The last picture has all colours of the scale; the first, at rest, has one.
     palette = pictures[-1].quantize(COLOURS)
     pictures = [p.quantize(palette=palette, dither=Image.Dither.NONE) for p in pictures]
-    with atomic(path) as temporary:
-        pictures[0].save(
-            temporary,
-            format="GIF",
-            save_all=True,
-            append_images=pictures[1:],
-            duration=milliseconds,
-            loop=0,
-        )
+    pictures[0].save(
+        path,
+        format="GIF",
+        save_all=True,
+        append_images=pictures[1:],
+        duration=milliseconds,
+        loop=0,
+    )
+
+
+def _write_mp4(path: Path, pictures: list[Image.Image], milliseconds: float) -> None:
+    with extra("figures"):
+        import imageio_ffmpeg
+    # Colours have half the resolution: the size is a multiple of two, and need not be of more.
+    writer = imageio_ffmpeg.write_frames(
+        str(path), pictures[0].size, fps=1000 / milliseconds, macro_block_size=2, quality=8
+    )
+    writer.send(None)
+    for picture in pictures:
+        writer.send(picture.tobytes())
+    writer.close()
 
 
 def cloud_slice(frame: xr.Dataset):

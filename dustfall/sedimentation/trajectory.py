@@ -13,6 +13,7 @@ from dustfall import __version__
 from dustfall.columns import Column, started_checksum
 from dustfall.extras import extra
 from dustfall.files import atomic
+from dustfall.units import RADIUS
 
 with extra("files"):
     import netCDF4
@@ -136,7 +137,8 @@ def write_trajectory(path: Path, frames: Records, box_length: float, attributes:
 
     Coordinates are unwrapped; `cell_lengths` folds them back into the cube. Lengths are in d_p,
     times in tau, velocities in v_s, as each variable's `units` say; `attributes` hold what these
-    are in SI.
+    are in SI. The units are no CF units, and no CF convention is claimed. OVITO draws spheres of
+    `radius`, xarray takes `time` for a coordinate and the labels for text.
     """
     particles = frames.record["coordinates"].shape[0]
     with atomic(path) as temporary, netCDF4.Dataset(temporary, "w", format="NETCDF4") as file:
@@ -161,13 +163,20 @@ def write_trajectory(path: Path, frames: Records, box_length: float, attributes:
             if units:
                 result.units = units
                 result.long_name = meaning
+            if "frame" in dimensions and name != "time":
+                result.coordinates = "time"
             return result
 
-        variable("spatial", "S1", ("spatial",))[:] = np.array(list("xyz"), "S1")
-        variable("cell_spatial", "S1", ("cell_spatial",))[:] = np.array(list("abc"), "S1")
-        variable("cell_angular", "S1", ("cell_angular", "label"))[:] = np.array(
-            [list("alpha"), list("beta "), list("gamma")], "S1"
-        )
+        labels = {
+            ("spatial",): list("xyz"),
+            ("cell_spatial",): list("abc"),
+            ("cell_angular", "label"): [list("alpha"), list("beta "), list("gamma")],
+        }
+        for dimensions, letters in labels.items():
+            label = variable(dimensions[0], "S1", dimensions)
+            label[:] = np.array(letters, "S1")
+            label.setncattr("_Encoding", "utf-8")
+        variable("radius", "f4", ("atom",), "d_p", "of the particles")[:] = RADIUS
         time = variable("time", "f8", ("frame",), "tau", "time since the start")
         lengths = variable(
             "cell_lengths", "f8", ("frame", "cell_spatial"), "d_p", "side of the cube"

@@ -54,6 +54,34 @@ def test_the_gif_has_its_pictures_and_the_same_bytes_each_time(tmp_path):
     assert seen == [(1, 3), (2, 3), (3, 3)]
 
 
+def test_the_mp4_shows_the_pictures_of_the_gif(tmp_path):
+    imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    save_movie(trajectory(), tmp_path / "a.gif", 3, milliseconds=100)
+    save_movie(trajectory(), tmp_path / "a.mp4", 3, milliseconds=100)
+    reader = imageio_ffmpeg.read_frames(str(tmp_path / "a.mp4"))
+    about = next(reader)
+    assert about["fps"] == 10
+    with Image.open(tmp_path / "a.gif") as movie:
+        assert about["size"] == movie.size
+        for k, frame in enumerate(reader):
+            movie.seek(k)
+            shown = np.frombuffer(frame, np.uint8).reshape(*movie.size[::-1], 3)
+            difference = np.asarray(movie.convert("RGB")).astype(float) - shown
+            assert np.abs(difference).mean() < 4
+    assert k == 2
+
+
+@pytest.mark.parametrize("name", ["a.avi", "gif", "a"])
+def test_a_movie_of_another_kind_is_refused(tmp_path, name):
+    with pytest.raises(ValueError, match=r"suffix \.gif or \.mp4"):
+        save_movie(trajectory(), tmp_path / name, 3)
+
+
+def test_what_is_no_trajectory_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="no cell_lengths, velocities in what"):
+        save_movie(trajectory().drop_vars(["velocities", "cell_lengths"]), tmp_path / "a.gif", 3)
+
+
 def test_a_single_frame_is_no_movie(tmp_path):
     with pytest.raises(ValueError, match="at least 2"):
         save_movie(trajectory(frames=1), tmp_path / "a.gif", 10)

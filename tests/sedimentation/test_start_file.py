@@ -45,7 +45,7 @@ def test_files_that_do_not_fit_are_refused_by_name(tmp_path):
     with pytest.raises(ValueError, match="holds 40 particles: 41 are needed"):
         read_start(table, 41, 1e-3)
     np.savetxt(table, POSITIONS[:, :2])
-    with pytest.raises(ValueError, match=r"start.txt: 2 columns without names are not position"):
+    with pytest.raises(ValueError, match="has 2 columns: 3 or 6"):
         read_start(table, 40, 1e-3)
     run(tmp_path, positions=POSITIONS)
     with pytest.raises(ValueError, match="fill a cube of"):
