@@ -12,7 +12,7 @@ from dustfall.forces.registry import trained_models
 from workflow import plan, stops
 from workflow.configuration import ConfigurationError, configure, read_file
 from workflow.cost import GO_ON, CostError, check_jobs, check_plan, cost
-from workflow.library import ROOT, digest, library_files
+from workflow.library import ROOT, cache_on_node, digest, library_files
 
 min_version("9.0")
 
@@ -33,6 +33,9 @@ except (ConfigurationError, CostError) as error:
 # The library of this checkout is the one whose files the rules watch, so it is the one they run;
 # each job keeps to one thread, because jobs fill the cores and bits must not depend on their number.
 os.environ.update(PYTHONPATH=str(ROOT), NUMBA_NUM_THREADS="1")
+if "SLURM_JOB_ID" in os.environ:
+    # Compiled code stays on the node: a shared file system is slow, and nodes differ.
+    os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_on_node()))
 
 
 report: "workflow/report/workflow.rst"
@@ -41,7 +44,17 @@ report: "workflow/report/workflow.rst"
 include: "workflow/rules/common.smk"
 include: "workflow/rules/scenes.smk"
 include: "workflow/rules/stokes.smk"
-include: "workflow/rules/dataset.smk"
+
+
+if config["dataset"]["file"]:
+
+    include: "workflow/rules/own_data.smk"
+
+else:
+
+    include: "workflow/rules/dataset.smk"
+
+
 include: "workflow/rules/training.smk"
 include: "workflow/rules/sedimentation.smk"
 include: "workflow/rules/exports.smk"
@@ -58,8 +71,7 @@ rule all:
         "results/config.yaml",
         "results/dataset/summary.csv",
         "results/dataset/summary.json",
-        "results/analysis/audit.csv",
-        MESHES,
+        SOLVER,
         "results/model/evaluation.csv",
         "results/analysis/independence_of_n.csv",
         "results/analysis/neighbour_changes.csv",
@@ -95,6 +107,10 @@ rule studies:
     input:
         "results/studies/step_size.csv",
         "results/studies/neighbour_numbers.csv",
+
+
+localrules:
+    configuration,
 
 
 rule configuration:

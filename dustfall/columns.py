@@ -44,15 +44,18 @@ def write_columns(
             stored.attrs["sha256"] = _checksum(array)
 
 
-def read_columns(path: str | PathLike, names: Iterable[str]) -> dict[str, np.ndarray]:
+def read_columns(
+    path: str | PathLike, names: Iterable[str], optional: Iterable[str] = ()
+) -> dict[str, np.ndarray]:
     """Read some columns of a file that `write_columns` wrote; text comes back as text.
 
-    Raises ValueError, with the name of the file, where it is damaged or lacks a column.
+    What is `optional` may be missing. Raises ValueError, with the name of the file, where it is
+    damaged or lacks a column.
     """
     found = {}
     try:
         with h5py.File(path) as file:
-            for name in names:
+            for name in (*names, *(name for name in optional if name in file)):
                 array = file[name][()]
                 if file[name].attrs["sha256"] != _checksum(array):
                     raise ValueError(f"{name} does not match its checksum")

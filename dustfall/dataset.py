@@ -16,6 +16,9 @@ from dustfall.scenes import LAWS, SCENE_COLUMNS
 from dustfall.solution import Status
 from dustfall.streams import Purpose, stream
 
+OWN_LAW = "own"
+"""In place of a radial law, of scenes that were not drawn here."""
+
 SOLUTION_COLUMNS = (
     "scene", "force", "status", "error_estimate", "iterations", "residual", "minimum_gap",
 )  # fmt: skip
@@ -30,14 +33,16 @@ COLUMNS = {
 }
 """Columns of the data set."""
 
+WEIGHT = {"weight": Column("1", "weight of the scene in training, where scenes have any")}
+
 
 @dataclass(frozen=True)
 class Dataset:
     """Scenes with their forces.
 
-    neighbours: (m, 5, 3) [d_p], sorted by distance; x spanwise, y streamwise, z vertical.
+    neighbours: (m, k, 3) [d_p], sorted by distance; x spanwise, y streamwise, z vertical.
     force: (m, 3) [Re_p c_D]. volume_fraction: (m,). radial_law: (m,) of str. scene: (m,) numbers
-    within each radial law.
+    within each radial law. weight: (m,), in training; None: all alike.
     """
 
     neighbours: np.ndarray
@@ -45,13 +50,19 @@ class Dataset:
     volume_fraction: np.ndarray
     radial_law: np.ndarray
     scene: np.ndarray
+    weight: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.scene)
 
     def select(self, which) -> "Dataset":
         """The scenes that an index array or a mask names."""
-        return Dataset(*(getattr(self, field.name)[which] for field in fields(self)))
+        return Dataset(**{name: values[which] for name, values in self.columns().items()})
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """The arrays by name; without weights where there are none."""
+        found = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {name: values for name, values in found.items() if values is not None}
 
     def of_laws(self, laws: Iterable[str]) -> "Dataset":
         """The scenes of some radial laws. Raises ValueError if there are none."""
@@ -87,8 +98,9 @@ def aggregate(shards: Iterable[Shard], numbers: Mapping[str, int]):
         part, solve = _read_shard(shard)
         parts.append(part)
         solves.append(solve)
-    columns = [field.name for field in fields(Dataset)]
-    joined = Dataset(*(np.concatenate([getattr(part, name) for part in parts]) for name in columns))
+    joined = Dataset(
+        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in COLUMNS}
+    )
     solve = pd.concat(solves, ignore_index=True)
 
     rank = np.array([list(numbers).index(law) for law in joined.radial_law])
@@ -148,7 +160,7 @@ def split(dataset: Dataset, share: float, seed: int) -> tuple[Dataset, Dataset]:
                 f"a test share of {share} of {len(rows)} scenes of radial law {law} leaves no "
                 "scene on one side"
             )
-        item = LAWS.index(law)
+        item = [*LAWS, OWN_LAW].index(law)
         test[stream(Purpose.TEST_SCENES, seed, item).permutation(rows)[:number]] = True
         # Row k is that of scene k, whichever scenes are here.
         draws = stream(Purpose.NEIGHBOUR_ORDER, seed, item)
@@ -165,31 +177,23 @@ def write(path: Path, dataset: Dataset, provenance: Mapping[str, object]) -> Non
     Equal data give equal files: no time stamp goes in.
     """
     frame = {"frame": "x spanwise, y streamwise, z vertical; the flow is along +y"}
-    values = {field.name: getattr(dataset, field.name) for field in fields(dataset)}
-    write_columns(path, COLUMNS, values, frame | dict(provenance))
+    columns = COLUMNS if dataset.weight is None else COLUMNS | WEIGHT
+    write_columns(path, columns, dataset.columns(), frame | dict(provenance))
 
 
 def read(path: Path) -> Dataset:
     """Read a data set that `write` wrote. Raises ValueError for a damaged file."""
-    return Dataset(**read_columns(path, COLUMNS))
+    return Dataset(**read_columns(path, COLUMNS, WEIGHT))
 
 
-def summary(dataset: Dataset, solve: pd.DataFrame) -> pd.DataFrame:
+def summary(dataset: Dataset, solve: pd.DataFrame | None = None) -> pd.DataFrame:
     """Table per radial law and decade of phi: counts, force statistics, effort of the solve.
 
-    dataset and solve are what `aggregate` returns. A row has 10^decade <= phi < 10^(decade+1).
+    dataset and solve are what `aggregate` returns; without a solve there are counts and forces
+    alone. A row has 10^decade <= phi < 10^(decade+1).
     Forces in Re_p c_D, gaps in d_p.
     """
     decade = ["radial_law", "decade"]
-    solve = solve.assign(decade=_decade(solve["volume_fraction"]))
-    table = solve.groupby(decade, sort=False).agg(
-        scenes=("scene", "size"),
-        unconverged=("converged", lambda converged: int((~converged).sum())),
-        iterations_median=("iterations", "median"),
-        iterations_max=("iterations", "max"),
-        error_estimate_max=("error_estimate", "max"),
-        gap_min=("minimum_gap", "min"),
-    )
     spanwise, streamwise, vertical = dataset.force.T
     forces = pd.DataFrame(
         {
@@ -207,6 +211,18 @@ def summary(dataset: Dataset, solve: pd.DataFrame) -> pd.DataFrame:
         spanwise_variance=("spanwise", "var"),
         vertical_variance=("vertical", "var"),
     )
+    if solve is None:
+        table = forces.groupby(decade).agg(scenes=("streamwise", "size"))
+    else:
+        solve = solve.assign(decade=_decade(solve["volume_fraction"]))
+        table = solve.groupby(decade, sort=False).agg(
+            scenes=("scene", "size"),
+            unconverged=("converged", lambda converged: int((~converged).sum())),
+            iterations_median=("iterations", "median"),
+            iterations_max=("iterations", "max"),
+            error_estimate_max=("error_estimate", "max"),
+            gap_min=("minimum_gap", "min"),
+        )
     return table.join(statistics).sort_index().reset_index()
 
 

@@ -14,7 +14,10 @@ from pathlib import Path
 import jsonschema
 import yaml
 
+from dustfall.forces.features import FEWEST
+from dustfall.forces.frames import MOST_NEIGHBOURS
 from dustfall.forces.registry import settling_models, trained_models
+from dustfall.own_data import shape
 from dustfall.scenes import LAWS
 from dustfall.sedimentation.properties import MOST_GALILEO, Properties
 from dustfall.sedimentation.state import box_length
@@ -274,41 +277,15 @@ def _show(value) -> str:
 def _check_physics(config: dict) -> None:
     """Refuse what each key allows alone, but not together with the others."""
     scenes, settle, figures = config["scenes"], config["sedimentation"], config["figures"]
-    idnn = config["idnn"]
     _require(
         scenes["phi_min"] < scenes["phi_max"],
         f"scenes.phi_min is {scenes['phi_min']:g}, but must be below scenes.phi_max, "
         f"which is {scenes['phi_max']:g}.",
     )
-    laws = idnn["laws"]
-    drawn = sum(scenes["number"][law] for law in laws)
-    fewest = 10 * idnn["folds"]
-    _require(
-        drawn >= fewest,
-        f"scenes.number is {drawn} in all of {', '.join(laws)}, but must be at least {fewest}, "
-        f"ten scenes for each of the {idnn['folds']} folds of idnn.folds.",
-    )
-    share = config["dataset"]["test_share"]
-    for law, number in scenes["number"].items():
-        _require(
-            number == 0 or round(share * number) > 0,
-            f"scenes.number.{law} is {number}, but must be 0 or at least "
-            f"{math.ceil(0.51 / share)}, so that dataset.test_share, {share:g}, leaves a scene.",
-        )
-    law = figures["radial_law"]
-    _require(
-        scenes["number"][law] > 0,
-        f"figures.radial_law is {law}, but must be a law that scenes.number draws scenes of.",
-    )
-    trained_on = {"idnn.laws": laws} | {
-        f"idnn.laws_of.{model}": own for model, own in idnn["laws_of"].items()
-    }
-    for key, own in trained_on.items():
-        for law in own:
-            _require(
-                scenes["number"][law] > 0,
-                f"{key} names {law}, but must name laws that scenes.number draws scenes of.",
-            )
+    if config["dataset"]["file"]:
+        _check_own_data(config)
+    else:
+        _check_scenes(config)
     low, high = figures["fit_frequencies"]
     _require(
         low < high,
@@ -447,6 +424,66 @@ def _check_start_file(config: dict) -> None:
             not Path(str(file)).is_dir(),
             f"sedimentation.start_file names {file}, a folder, but must name a file.",
         )
+
+
+def _check_scenes(config: dict) -> None:
+    """Refuse numbers of scenes that leave a stage without any."""
+    scenes = config["scenes"]
+    laws = config["idnn"]["laws"]
+    drawn = sum(scenes["number"][law] for law in laws)
+    fewest = 10 * config["idnn"]["folds"]
+    _require(
+        drawn >= fewest,
+        f"scenes.number is {drawn} in all of {', '.join(laws)}, but must be at least {fewest}, "
+        f"ten scenes for each of the {config['idnn']['folds']} folds of idnn.folds.",
+    )
+    share = config["dataset"]["test_share"]
+    for law, number in scenes["number"].items():
+        _require(
+            number == 0 or round(share * number) > 0,
+            f"scenes.number.{law} is {number}, but must be 0 or at least "
+            f"{math.ceil(0.51 / share)}, so that dataset.test_share, {share:g}, leaves a scene.",
+        )
+    law = config["figures"]["radial_law"]
+    _require(
+        scenes["number"][law] > 0,
+        f"figures.radial_law is {law}, but must be a law that scenes.number draws scenes of.",
+    )
+    trained_on = {"idnn.laws": laws} | {
+        f"idnn.laws_of.{model}": own for model, own in config["idnn"]["laws_of"].items()
+    }
+    for key, own in trained_on.items():
+        for law in own:
+            _require(
+                scenes["number"][law] > 0,
+                f"{key} names {law}, but must name laws that scenes.number draws scenes of.",
+            )
+
+
+def _check_own_data(config: dict) -> None:
+    """Refuse a data set of one's own that is missing, unreadable or too small."""
+    file, folds = config["dataset"]["file"], config["idnn"]["folds"]
+    try:
+        number, neighbours = shape(file)
+    except (OSError, ValueError) as error:
+        raise ConfigurationError(f"dataset.file: {error}.") from None
+    _require(
+        number >= 10 * folds,
+        f"dataset.file is {file}, which has {number} scenes, but must have at least {10 * folds}, "
+        f"ten for each of the {folds} folds of idnn.folds.",
+    )
+    fewest, most = FEWEST["decomposed"], MOST_NEIGHBOURS
+    _require(
+        fewest <= neighbours <= most,
+        f"dataset.file is {file}, which has {neighbours} neighbours a scene, but must have "
+        f"{fewest} to {most}.",
+    )
+    smallest = min(config["sedimentation"]["particles"])
+    _require(
+        neighbours < smallest,
+        f"dataset.file is {file}, which has {neighbours} neighbours a scene, but must have fewer "
+        f"than the smallest of sedimentation.particles, which is {smallest}.",
+    )
 
 
 def _require_multiple(key: str, value: float, of: str, step: float, unit: str = "response") -> None:

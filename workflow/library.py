@@ -2,6 +2,9 @@
 
 import ast
 import hashlib
+import os
+import stat
+import tempfile
 from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
@@ -41,6 +44,20 @@ def digest(files: Iterable[str]) -> str:
     for file in files:
         found.update(f"{file} {_content(file)}\n".encode())
     return found.hexdigest()[:16]
+
+
+def cache_on_node() -> Path:
+    """Folder for compiled code on the disk of the machine: this user's own, made if need be.
+
+    Numba runs what it finds there, so that a folder that someone else may write to is passed over
+    for a new one.
+    """
+    folder = Path(tempfile.gettempdir(), f"dustfall-numba-{os.getuid()}")
+    folder.mkdir(mode=0o700, exist_ok=True)
+    found = folder.lstat()
+    if found.st_uid != os.getuid() or stat.S_IMODE(found.st_mode) & 0o077:
+        return Path(tempfile.mkdtemp(prefix=f"{folder.name}-"))
+    return folder
 
 
 @cache

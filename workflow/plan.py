@@ -6,8 +6,10 @@ from math import ceil
 from typing import NamedTuple
 from zlib import crc32
 
+from dustfall.dataset import OWN_LAW
 from dustfall.forces.features import KINDS
 from dustfall.forces.registry import settling_models, trained_models
+from dustfall.own_data import shape
 from dustfall.sedimentation import AllParticles, Properties
 
 ALL_PARTICLES, BACK_FLOW = AllParticles.name, "back_flow"
@@ -46,7 +48,12 @@ class Case(NamedTuple):
 
 
 def shards(config: dict) -> list[str]:
-    """Names of all shards, like uniform-0000: scenes are numbered and cut per radial law."""
+    """Names of all shards, like uniform-0000: scenes are numbered and cut per radial law.
+
+    A data set of one's own has none.
+    """
+    if config["dataset"]["file"]:
+        return []
     size = config["scenes"]["shard_size"]
     return [
         f"{law}-{shard:04d}"
@@ -74,6 +81,8 @@ def shard_of(config: dict, law: str, scene: str) -> str:
 
 def kept_meshes(config: dict) -> list[str]:
     """Names of the scenes whose meshes are kept, like uniform-000000: the first of each law."""
+    if config["dataset"]["file"]:
+        return []
     return [
         f"{law}-{scene:06d}"
         for law, number in config["scenes"]["number"].items()
@@ -97,7 +106,14 @@ def trial_layers(name: str) -> str:
 
 def laws(config: dict, model: str) -> list[str]:
     """Radial laws whose scenes a model is trained on."""
+    if config["dataset"]["file"]:
+        return [OWN_LAW]
     return config["idnn"]["laws_of"].get(model, config["idnn"]["laws"])
+
+
+def figure_law(config: dict) -> str:
+    """Radial law whose scenes the figures of forces show."""
+    return OWN_LAW if config["dataset"]["file"] else config["figures"]["radial_law"]
 
 
 def learning_curve(config: dict) -> list[str]:
@@ -119,6 +135,9 @@ def learning_curve(config: dict) -> list[str]:
 def training_scenes(config: dict, model: str) -> int:
     """Number of scenes that a model has for training: of its laws, without the test scenes."""
     share = config["dataset"]["test_share"]
+    if config["dataset"]["file"]:
+        number, _ = shape(config["dataset"]["file"])
+        return number - round(share * number)
     drawn = (config["scenes"]["number"][law] for law in laws(config, model))
     return sum(number - round(share * number) for number in drawn)
 
@@ -139,7 +158,7 @@ def ablation(config: dict) -> list[str]:
 
 def trial_laws(config: dict, model: str, number: str) -> list[str]:
     """Radial laws that a trial is trained on: the ablation compares on those of all models."""
-    return config["idnn"]["laws"] if number == "all" else laws(config, model)
+    return laws(config, "idnn" if number == "all" else model)
 
 
 def training(config: dict, model: str) -> dict:

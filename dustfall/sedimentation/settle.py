@@ -146,7 +146,8 @@ def settle(
     Raises
     ------
     ValueError : the checkpoint is of a run with other settings, or another run is at work on it;
-        the closure is made for another step; or the flow is no Stokes flow (see `Properties.check_stokes_flow`).
+        the closure is made for another step; or the flow is no Stokes flow (see
+        `Properties.check_stokes_flow`).
     FloatingPointError : the drag is not finite, or a particle has flown off.
     SystemExit : SIGTERM or Ctrl-C came, and the state was saved.
     """

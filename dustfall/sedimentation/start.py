@@ -12,8 +12,8 @@ from dustfall.sedimentation.neighbours import FARTHEST, sort_by_cell
 from dustfall.sedimentation.state import State, box_length
 from dustfall.sedimentation.trajectory import open_run
 from dustfall.spheres import checked_numbers
-from dustfall.suspension.cube import folded
 from dustfall.streams import Purpose, stream
+from dustfall.suspension.cube import folded
 from dustfall.tables import Quantity, read_table
 from dustfall.units import CONTACT
 

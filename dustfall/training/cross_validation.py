@@ -8,6 +8,7 @@ from dustfall.training.fit import (
     SETTINGS,
     TrainingSettings,
     check_samples,
+    check_weight,
     score,
     train_networks,
     training_scenes,
@@ -27,15 +28,16 @@ def cross_validate(
     radial_input: str = "logarithm",
     device: str = "cpu",
     progress=None,
+    weight=None,
 ) -> dict:
     """Train a layer configuration once a fold, each time validated on the fold left out.
 
     Parameters: `neighbours` (m, k, 3) in d_p, `force` (m, 3) in Re_p c_D, `component` streamwise
     or lateral, the rest as in `training.train_model`. Returns plain values for a JSON file:
-    component, kind, layers, parameters (their number), and `folds`, a list with fold, mse
-    [(Re_p c_D)^2], r2 and epochs (of the weights kept). As in the paper the fold that scores also
-    picks the epoch. A fold depends on (seed, component, fold) alone: it has the same bits in any
-    sweep. `progress(done, total)` counts epochs.
+    component, kind, layers, neighbours and parameters (their numbers), and `folds`, a list with
+    fold, mse [(Re_p c_D)^2], r2 and epochs (of the weights kept). As in the paper the fold that
+    scores also picks the epoch. A fold depends on (seed, component, fold) alone: it has the same
+    bits in any sweep. `progress(done, total)` counts epochs.
 
     Raises ValueError for arguments out of range.
     """
@@ -46,6 +48,7 @@ def cross_validate(
     if not isinstance(folds, int) or folds < 2:
         raise ValueError(f"folds is {folds!r}; it must be an integer >= 2")
     neighbours, force = check_samples(neighbours, force, 2 * folds)
+    weight = check_weight(weight, len(force))
     scenes, _ = training_scenes(kind, neighbours, radial_input)
     dealt = stream(Purpose.FOLDS, seed).permutation(len(neighbours)) % folds
     splits = [
@@ -58,14 +61,25 @@ def cross_validate(
             progress(epoch, settings.epochs)
 
     trained = train_networks(
-        kind, scenes, force, component, layers, splits, settings, seed, numbers, report, device
+        kind,
+        scenes,
+        force,
+        component,
+        layers,
+        splits,
+        settings,
+        seed,
+        numbers,
+        report,
+        device,
+        weight,
     )
     if progress:
         progress(settings.epochs, settings.epochs)
     results = [
         {
             "fold": fold,
-            **score(network, scenes, force, component, validation),
+            **score(network, scenes, force, component, validation, weight),
             "epochs": history.best_epoch,
         }
         for fold, ((network, history), (_, validation)) in enumerate(
@@ -76,6 +90,7 @@ def cross_validate(
         "component": component,
         "kind": kind,
         "layers": layers,
+        "neighbours": neighbours.shape[1],
         "parameters": trained[0][0].parameters,
         "folds": results,
     }

@@ -102,12 +102,14 @@ def fit(
     settings: TrainingSettings,
     generators: list[torch.Generator],
     report=None,
+    weight: torch.Tensor | None = None,
 ) -> list[History]:
     """Train k networks side by side, in place, and leave each at its best validation error.
 
     `tensors` are the normalised inputs (k, m, neighbours, F), envelope (k, m, block inputs) and
     target (k, m, 1 or 2); `splits` are each network's training and validation rows, `generators`
-    shuffle them. In an epoch all take as many steps as the smallest training set gives.
+    shuffle them. In an epoch all take as many steps as the smallest training set gives. `weight`
+    (m, 1) multiplies the squared errors of a row.
     `report(epoch)` is called after each epoch. Returns the histories, in the target's unit. Raises
     FloatingPointError when no validation error of a network was finite.
     """
@@ -141,14 +143,20 @@ def fit(
         for start in range(0, size - batch + 1, batch):
             rows = slice(start, start + batch)
             error = networks(*(t[:, rows] for t in shown)) - aim[:, rows]
-            loss = error.square().mean((1, 2)).sum()  # each network's gradient is its own error's
+            squares = error.square()
+            if weight is not None:
+                squares = squares * weight[shuffled[:, rows]]
+            loss = squares.mean((1, 2)).sum()  # each network's gradient is its own error's
             optimiser.zero_grad()
             loss.backward()
             optimiser.step()
         if epoch % settings.validate_every == 0 or epoch == settings.epochs:
             with torch.no_grad():
                 error = networks(*(t[side, validation] for t in given)).double()
-                error = (error - target[side, validation]).square().mean(2).cpu()
+                error = (error - target[side, validation]).square()
+                if weight is not None:
+                    error = error * weight[validation]
+                error = error.mean(2).cpu()
             for k in list(active):
                 history = histories[k]
                 history.epochs.append(epoch)
@@ -185,6 +193,7 @@ def train_model(
     radial_input: str = "logarithm",
     device: str = "cpu",
     progress=None,
+    weight=None,
 ) -> LearnedModel:
     """Train both components of a force model.
 
@@ -194,13 +203,14 @@ def train_model(
     for the distance, "distance" or "logarithm" (unit vectors come with 1/r and log r). One sample
     in ten, drawn from the seed, is kept for validation. `device` is PyTorch's, "cpu" or "cuda": on
     the CPU the same arguments give the same bits on one machine. `progress(done, total)` counts
-    epochs.
+    epochs. `weight` (m,), of a sample's squared error in training and validation; None: all alike.
 
     Raises ValueError for arguments out of range and FloatingPointError when training diverges.
     """
     parse_layers(layers, kind)
     settings = settings or SETTINGS[kind]
     neighbours, force = check_samples(neighbours, force, 10)
+    weight = check_weight(weight, len(force))
     scenes, largest = training_scenes(kind, neighbours, radial_input)
     shuffled = stream(Purpose.VALIDATION, seed).permutation(len(neighbours))
     kept = max(1, round(VALIDATION_SHARE * len(neighbours)))
@@ -214,9 +224,20 @@ def train_model(
 
         split = [(training, validation)]
         ((networks[component], history[component]),) = train_networks(
-            kind, scenes, force, component, layers, split, settings, seed, [0], report, device
+            kind,
+            scenes,
+            force,
+            component,
+            layers,
+            split,
+            settings,
+            seed,
+            [0],
+            report,
+            device,
+            weight,
         )
-        scores[component] = score(networks[component], scenes, force, component, validation)
+        scores[component] = score(networks[component], scenes, force, component, validation, weight)
     if progress:
         progress(len(COMPONENTS) * settings.epochs, len(COMPONENTS) * settings.epochs)
     layout = KINDS[kind]
@@ -238,7 +259,7 @@ def train_model(
         "units": {"length": "d_p", "force": "Re_p c_D"},
         "training": {
             "samples": len(neighbours),
-            "data_sha256": data_hash(neighbours, force),
+            "data_sha256": data_hash(neighbours, force, *([] if weight is None else [weight])),
             "seed": seed,
             "settings": asdict(settings),
             "validation": scores,
@@ -260,6 +281,7 @@ def train_networks(
     folds: list[int],
     report=None,
     device: str = "cpu",
+    weight: np.ndarray | None = None,
 ) -> list[tuple[Network, History]]:
     """Train a network of one component on each split; return them with their histories.
 
@@ -283,9 +305,18 @@ def train_networks(
         torch.from_numpy(np.stack(arrays).astype(np.float32)).to(device)
         for arrays in (normal, [scenes.envelope] * len(splits), [target / unit for unit in units])
     ]
+    heavy = weight if weight is None else torch.from_numpy(weight[:, None].astype(np.float32))
     with one_thread():
         networks = build(kind, layers, component, neighbours, generators).to(device)
-        histories = fit(networks, tensors, splits, settings, generators, report)
+        histories = fit(
+            networks,
+            tensors,
+            splits,
+            settings,
+            generators,
+            report,
+            heavy if heavy is None else heavy.to(device),
+        )
     trained = []
     for k, (mean, scale, unit, history) in enumerate(
         zip(means, scales, units, histories, strict=True)
@@ -307,16 +338,27 @@ def _generator(seed: int, *items: int) -> torch.Generator:
 
 
 def score(
-    network: Network, scenes: Scenes, force: np.ndarray, component: str, rows: np.ndarray
+    network: Network,
+    scenes: Scenes,
+    force: np.ndarray,
+    component: str,
+    rows: np.ndarray,
+    weight: np.ndarray | None = None,
 ) -> dict[str, float]:
     """Return the mean squared error and R^2 of a component on some rows, in float64.
 
     R^2 is that of the force itself, all of the component's columns together (their own means).
+    `weight` (m,) are those of the samples.
     """
     target = force[rows][:, COMPONENTS[component]]
     residual = network.residual(scenes.inputs, scenes.envelope)
     error = (scenes.force(residual, component)[rows] - target) ** 2
-    spread = ((target - target.mean(axis=0)) ** 2).sum()
+    if weight is None:
+        spread = ((target - target.mean(axis=0)) ** 2).sum()
+    else:
+        share = weight[rows] / weight[rows].mean()
+        error = error * share[:, None]
+        spread = (share @ (target - np.average(target, axis=0, weights=share)) ** 2).sum()
     return {"mse": float(error.mean()), "r2": float(1 - error.sum() / spread)}
 
 
@@ -333,6 +375,16 @@ def check_samples(neighbours, force, fewest: int) -> tuple[np.ndarray, np.ndarra
     return neighbours, force
 
 
+def check_weight(weight, samples: int) -> np.ndarray | None:
+    """Return weights (m,) with a mean of one, or none for none. Raises ValueError for bad ones."""
+    if weight is None:
+        return None
+    weight = np.asarray(weight, dtype=float)
+    if weight.shape != (samples,) or not (np.isfinite(weight) & (weight > 0)).all():
+        raise ValueError(f"weight must be {samples} finite values above 0, one a sample")
+    return weight / weight.mean()
+
+
 def training_scenes(kind: str, neighbours: np.ndarray, radial_input: str) -> tuple[Scenes, float]:
     """Return the scenes as networks of `kind` take them, and the largest distance among them."""
     if radial_input not in RADIAL_INPUTS:
@@ -341,10 +393,10 @@ def training_scenes(kind: str, neighbours: np.ndarray, radial_input: str) -> tup
     return describe(kind, neighbours, radial_input, largest), largest
 
 
-def data_hash(neighbours: np.ndarray, force: np.ndarray) -> str:
+def data_hash(*arrays: np.ndarray) -> str:
     """Return the SHA-256 of the samples' bytes (float64, little endian)."""
     digest = hashlib.sha256()
-    for array in (neighbours, force):
+    for array in arrays:
         digest.update(np.ascontiguousarray(array, dtype="<f8").tobytes())
     return digest.hexdigest()
 

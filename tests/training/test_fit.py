@@ -158,3 +158,38 @@ def test_diverging_training_says_so(samples):
     settings = TrainingSettings(epochs=20, learning_rate=1e30, batch_size=64)
     with pytest.raises(FloatingPointError, match="diverged"):
         train_model("dense", *samples, "8-8", settings)
+
+
+def test_scenes_of_little_weight_teach_nothing(samples):
+    neighbours, force = (part[:600] for part in samples)
+    wrong = np.arange(600) % 3 == 0
+    spoilt = np.where(wrong[:, None], -force, force)
+    settings = TrainingSettings(batch_size=128, epochs=20, validate_every=5)
+    heeded, ignored = (
+        train_model("pairwise", neighbours, spoilt, "16-16", settings, weight=weight)
+        for weight in (None, np.where(wrong, 1e-6, 1.0))
+    )
+    heeded, ignored = (
+        r2(model.predict(neighbours)[~wrong, 1], force[~wrong, 1]) for model in (heeded, ignored)
+    )
+    assert ignored > 0.6 > 0.0 > heeded
+
+
+def test_the_unit_of_the_weights_does_not_matter(samples):
+    neighbours, force = (part[:100] for part in samples)
+    settings = TrainingSettings(batch_size=32, epochs=2)
+    weight = np.random.default_rng(3).uniform(0.5, 2.0, 100)
+    one, other = (
+        train_model("dense", neighbours, force, "8", settings, weight=unit * weight).predict(
+            neighbours
+        )
+        for unit in (1.0, 1024.0)
+    )
+    np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("weight", [np.zeros(100), np.ones(99), np.full(100, np.nan)])
+def test_weights_that_weigh_nothing_are_refused(samples, weight):
+    neighbours, force = (part[:100] for part in samples)
+    with pytest.raises(ValueError, match="weight must be 100 finite values above 0"):
+        train_model("dense", neighbours, force, "8", weight=weight)

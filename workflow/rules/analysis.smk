@@ -1,3 +1,11 @@
+# Beside Snakemake, not on a cluster.
+localrules:
+    data_summary,
+    steady_state,
+    independence_of_n,
+    neighbour_changes,
+
+
 rule data_summary:
     """What the paper states of its forces, and all rank correlations, for each radial law."""
     input:
@@ -13,7 +21,7 @@ rule data_summary:
         "logs/data_summary.log",
     params:
         library=library("data_summary.py"),
-        radial_law=config["figures"]["radial_law"],
+        radial_law=plan.figure_law(config),
     script:
         "../scripts/data_summary.py"
 

@@ -10,7 +10,7 @@ rule prediction_benchmark:
         "logs/benchmarks/prediction.log",
     params:
         library=library("prediction_benchmark.py"),
-        radial_law=config["figures"]["radial_law"],
+        radial_law=plan.figure_law(config),
     script:
         "../scripts/prediction_benchmark.py"
 

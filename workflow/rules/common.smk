@@ -44,6 +44,9 @@ TRIALS = plan.trials(config)
 MESHES = expand(
     "results/meshes/{scene}.{ending}", scene=plan.kept_meshes(config), ending=["msh", "vtu"]
 )
+# What tells of the solver, and belongs to no data set of one's own.
+SOLVER = [] if config["dataset"]["file"] else ["results/analysis/audit.csv", *MESHES]
+SOLVER_FIGURES = [] if config["dataset"]["file"] else ["mesh_study", "audit", "scene_meshes"]
 CASES = plan.cases(config)
 
 # The cases that tell the steady state, and those of them among nearest neighbours; the cases of
@@ -74,6 +77,10 @@ def trained(model):
     return f"results/model/{model}.safetensors" if model in LEARNED_MODELS else []
 
 
+# Graphics cards that training asks of a cluster for.
+GPUS = 1 if config["idnn"]["device"] == "cuda" else 0
+
+
 FIGURES = expand(
     "results/figures/{figure}.{ending}",
     figure=[
@@ -93,9 +100,7 @@ FIGURES = expand(
         "trajectories",
         "trajectories_3d",
         "frozen_cloud",
-        "mesh_study",
-        "audit",
-        "scene_meshes",
+        *SOLVER_FIGURES,
     ],
     ending=["png", "pdf", "csv"],
 ) + ["results/figures/settling_cloud.gif"]

@@ -1,3 +1,26 @@
+# Beside Snakemake, not on a cluster.
+localrules:
+    figure_force_scatter,
+    figure_force_pdf,
+    figure_spearman,
+    figure_predicted_vs_target,
+    figure_error_by_distance,
+    figure_learning_curve,
+    figure_inverse_beta,
+    figure_settling_in_time,
+    figure_phase_and_spectra,
+    figure_cloud_spectra,
+    figure_ergodicity,
+    figure_trajectories,
+    figure_trajectories_3d,
+    movie,
+    figure_voronoi_pdf,
+    figure_voronoi_variance,
+    figure_mesh_study,
+    figure_audit,
+    figure_scene_meshes,
+
+
 rule figure_force_scatter:
     """Force components against volume fraction."""
     input:
@@ -8,7 +31,7 @@ rule figure_force_scatter:
         "logs/figures/force_scatter.log",
     params:
         library=library("figure_force_scatter.py"),
-        radial_law=config["figures"]["radial_law"],
+        radial_law=plan.figure_law(config),
         samples=config["figures"]["samples"],
     script:
         "../scripts/figure_force_scatter.py"
@@ -24,7 +47,7 @@ rule figure_force_pdf:
         "logs/figures/force_pdf.log",
     params:
         library=library("figure_force_pdf.py"),
-        radial_law=config["figures"]["radial_law"],
+        radial_law=plan.figure_law(config),
     script:
         "../scripts/figure_force_pdf.py"
 
@@ -39,7 +62,7 @@ rule figure_spearman:
         "logs/figures/spearman.log",
     params:
         library=library("figure_spearman.py"),
-        radial_law=config["figures"]["radial_law"],
+        radial_law=plan.figure_law(config),
     script:
         "../scripts/figure_spearman.py"
 
@@ -54,7 +77,7 @@ rule figure_predicted_vs_target:
         "logs/figures/predicted_vs_target.log",
     params:
         library=library("figure_predicted_vs_target.py"),
-        radial_law=config["figures"]["radial_law"],
+        radial_law=plan.figure_law(config),
         samples=config["figures"]["samples"],
     script:
         "../scripts/figure_predicted_vs_target.py"

@@ -1,3 +1,9 @@
+# Beside Snakemake, not on a cluster.
+localrules:
+    step_size,
+    neighbour_numbers,
+
+
 rule study_of_a_step:
     """Let a small cloud settle with one of the time steps that are compared."""
     input:

@@ -1,3 +1,11 @@
+# Jobs that take seconds run beside Snakemake where the others go to a cluster.
+localrules:
+    winner,
+    learning_curve,
+    ablation,
+    evaluation,
+
+
 rule sweep:
     """Cross-validate one configuration of layers for one component."""
     input:
@@ -8,11 +16,13 @@ rule sweep:
         "logs/sweep/{component}/{layers}.log",
     benchmark:
         "benchmarks/sweep/{component}/{layers}.tsv"
+    resources:
+        gpu=GPUS,
     params:
         library=library("sweep.py"),
         seed=config["seed"],
         test_share=config["dataset"]["test_share"],
-        laws=config["idnn"]["laws"],
+        laws=plan.laws(config, "idnn"),
         folds=config["idnn"]["folds"],
         layers=lambda wc: plan.trial_layers(wc.layers),
         radial_input=config["idnn"]["radial_input"],
@@ -50,6 +60,8 @@ rule model:
         "logs/model/{model}.log",
     benchmark:
         "benchmarks/model/{model}.tsv"
+    resources:
+        gpu=GPUS,
     params:
         library=library("train.py"),
         seed=config["seed"],
@@ -73,6 +85,8 @@ rule trial:
         "logs/trials/{model}-{layers}-{number}.log",
     benchmark:
         "benchmarks/trials/{model}-{layers}-{number}.tsv"
+    resources:
+        gpu=GPUS,
     params:
         library=library("trial.py"),
         seed=config["seed"],

@@ -8,7 +8,7 @@ import pandas as pd
 import joblog
 from dustfall.analysis.correlations import COORDINATES, spearman_by_neighbours
 from dustfall.analysis.distributions import force_summary
-from dustfall.dataset import read
+from dustfall.dataset import OWN_LAW, read
 from dustfall.files import atomic
 
 joblog.start(snakemake)
@@ -22,6 +22,9 @@ for law in dict.fromkeys(data.radial_law):
         "forces": force_summary(own.volume_fraction, own.force),
         "spearman": pd.concat(correlations, ignore_index=True),
     }
+    if law == OWN_LAW:
+        # The paper states nothing of other data.
+        tables["forces"] = tables["forces"].assign(paper=np.nan)
     summary[law] = {
         # JSON has no NaN: what the paper does not state is null.
         name: table.astype(object).replace({np.nan: None}).to_dict("records")

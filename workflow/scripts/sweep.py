@@ -24,6 +24,7 @@ result = cross_validate(
     radial_input=params.radial_input,
     device=params.device,
     progress=progress(f"{snakemake.wildcards.component} {params.layers}", "epochs"),
+    weight=training.weight,
 )
 with atomic(snakemake.output[0]) as path:
     path.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")

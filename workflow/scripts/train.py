@@ -24,6 +24,7 @@ model = train_model(
     radial_input=params.radial_input,
     device=params.device,
     progress=progress(f"{kind} {layers}", "epochs"),
+    weight=training.weight,
 )
 model.header["training"]["command"] = f"snakemake -- {snakemake.output[0]}"
 print(json.dumps(model.header, indent=2))

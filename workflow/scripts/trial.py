@@ -31,6 +31,7 @@ model = train_model(
     radial_input=params.radial_input,
     device=params.device,
     progress=progress(f"{wildcards.model} {params.layers}, {len(training)} scenes", "epochs"),
+    weight=training.weight,
 )
 table = scores({model.name: model.predict(test.neighbours)}, test)
 parameters = {component: network.parameters for component, network in model.networks.items()}

@@ -17,7 +17,7 @@ winner = choose_winner(results)
 folds = pd.concat(pd.DataFrame(result.pop("folds")).assign(**result) for result in results)
 folds["multiplications"] = [
     multiplications(*trial)
-    for trial in zip(folds["kind"], folds["layers"], folds["component"], strict=True)
+    for trial in folds[["kind", "layers", "component", "neighbours"]].itertuples(index=False)
 ]
 table = folds.groupby(["component", "layers", "parameters", "multiplications"]).agg(
     mse_mean=("mse", "mean"),

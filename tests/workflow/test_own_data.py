@@ -1,0 +1,69 @@
+"""A data set of one's own takes the place of scenes and their solution."""
+
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from dustfall.dataset import read
+from dustfall.forces import load_model
+from tests.workflow.conftest import ROOT, Project
+
+SMALL = (
+    *("--configfile", "config/smoke.yaml", "--config", "dataset={file: fixed_array.csv}"),
+    "idnn={layers: [10/10], training: {epochs: 10}, training_of: {anchored: {epochs: 10}}}",
+)
+
+
+@pytest.fixture(scope="module")
+def own(tmp_path_factory) -> Project:
+    """A project with the file that docs/extend.md makes: spheres held in a periodic cube."""
+    project = Project(tmp_path_factory.mktemp("own"))
+    page = (ROOT / "docs/extend.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```python\n(.*?)```", page, re.S)
+    code = next(block for block in blocks if "fixed_array.csv" in block)
+    subprocess.run([sys.executable, "-c", code], cwd=project.folder, check=True)
+    return project
+
+
+def test_nothing_is_drawn_or_solved_and_all_else_is_planned(own):
+    ordinary = own.plan("--configfile", "config/smoke.yaml", "--", "all")
+    jobs = own.plan(*SMALL, "--", "all")
+    left_out = {"scenes", "stokes", "audit", "scene_mesh", "mesh_study", "dataset"}
+    left_out |= {"figure_audit", "figure_mesh_study", "figure_scene_meshes"}
+    assert set(ordinary) - set(jobs) == left_out
+    assert set(jobs) - set(ordinary) == {"own_data"}
+
+
+@pytest.mark.slow
+def test_models_of_ten_neighbours_are_swept_trained_scored_and_drawn(own):
+    own.run(
+        *SMALL, "--", "results/model/evaluation.csv", "results/figures/spearman.png",
+        "results/figures/force_scatter.png", "results/dataset/summary.json",
+    )  # fmt: skip
+    results = own.folder / "results"
+    dataset = read(results / "dataset/forces.h5")
+    table = pd.read_csv(own.folder / "fixed_array.csv")
+    np.testing.assert_array_equal(dataset.force, table[["fx", "fy", "fz"]])
+    model = load_model(results / "model/anchored.safetensors")
+    assert model.neighbours == 10
+    assert model.predict(dataset.neighbours).shape == dataset.force.shape
+    scores = pd.read_csv(results / "model/evaluation.csv")
+    assert set(scores["radial_law"]) == {"own"}
+    assert {"anchored", "idnn", "dense", "rotne_prager"} <= set(scores["model"])
+
+
+def test_files_that_do_not_fit_are_refused_with_a_sentence(own):
+    (own.folder / "few.csv").write_text("x1,y1,z1,fx,fy,fz\n" + "1,2,3,4,5,6\n" * 100)
+    for file, sentence in (
+        ("none.csv", "dataset.file: there is no file none.csv."),
+        ("few.csv", "dataset.file is few.csv, which has 1 neighbours a scene, but must have 3 to"),
+    ):
+        done = own.snakemake(
+            "--configfile", "config/smoke.yaml", "--config", f"dataset={{file: {file}}}", "-n"
+        )
+        assert f"Configuration: {sentence}" in done.stdout + done.stderr
+        assert "Traceback" not in done.stdout + done.stderr
