@@ -1,5 +1,6 @@
 # `make run` and `make test`: each sets up all that it needs, then does its one job. `make openfoam`
-# builds the plugin, `make openfoam-test` holds it to the Python package.
+# builds the plugin, `make openfoam-test` holds it to the Python package; `make slurm-test` runs the
+# campaign on a cluster of one node.
 
 CONFIG ?= config/config.yaml
 PYTHON ?= python3
@@ -12,14 +13,27 @@ GMSH_LIBRARIES := libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 libgomp1
 CAN_INSTALL := [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null
 APT_INSTALL := apt-get update && apt-get install -y --no-install-recommends
 
-.PHONY: run test openfoam openfoam-test tools-test environment lock gmsh-libraries clean-environment
+.PHONY: run shell test slurm-test openfoam openfoam-test tools-test environment lock \
+	gmsh-libraries clean-environment
 
 run: environment
 	@$(VENV)/bin/python -m workflow.configuration $(CONFIG)
 	$(VENV)/bin/snakemake --configfile $(CONFIG) -- all
 
+# The environment of `make run`, where every command of the README works as it is written.
+shell: environment
+	@. $(VENV)/bin/activate && exec "$${SHELL:-sh}"
+
 test: environment
-	$(VENV)/bin/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m "not openfoam and not tools"
+	$(VENV)/bin/python -m pytest -n auto --dist loadfile --no-loadscope-reorder \
+		-m "not openfoam and not slurm and not tools"
+
+# Wants root and Debian's SLURM, which it installs where it can; else the tests say what is missing.
+slurm-test: environment
+	$(PIP_INSTALL) -r requirements-slurm.txt
+	@command -v slurmctld >/dev/null || ! { $(CAN_INSTALL); } || \
+		{ $(APT_INSTALL) slurm-wlm munge; } >/dev/null
+	$(VENV)/bin/python -m pytest tests/slurm -rs -s
 
 openfoam:
 	openfoam/build.sh
@@ -52,6 +66,7 @@ $(VENV)/new:
 		exit 1; }
 	$(PIP_INSTALL) --require-hashes -r requirements.lock
 	$(PIP_INSTALL) -r requirements.txt
+	$(PIP_INSTALL) --no-deps --editable .
 	@sha256sum requirements.txt requirements.lock > $(STAMP)
 
 # For all platforms and Pythons. torch, and the CUDA libraries of some of its builds, are left out.
