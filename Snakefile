@@ -9,7 +9,7 @@ import sys
 from snakemake.utils import min_version
 
 from dustfall.forces.registry import trained_models
-from workflow import plan, stops
+from workflow import plan, stops, terminal
 from workflow.configuration import ConfigurationError, configure, read_file
 from workflow.cost import GO_ON, CostError, check_jobs, check_plan, cost
 from workflow.library import ROOT, cache_on_node, digest, library_files
@@ -36,6 +36,9 @@ os.environ.update(PYTHONPATH=str(ROOT), NUMBA_NUM_THREADS="1")
 if "SLURM_JOB_ID" in os.environ:
     # Compiled code stays on the node: a shared file system is slow, and nodes differ.
     os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_on_node()))
+
+
+LINE = terminal.follow(workflow)
 
 
 report: "workflow/report/workflow.rst"
@@ -148,4 +151,5 @@ onsuccess:
 
 
 onerror:
+    LINE.stop()
     stops.announce(log)

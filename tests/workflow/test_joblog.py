@@ -1,7 +1,6 @@
-"""A job's words go into its log, its progress bar to the terminal as well."""
+"""A job's words go into its log, and nowhere else."""
 
 import os
-import pty
 import signal
 import subprocess
 import sys
@@ -49,19 +48,7 @@ def test_an_uncaught_exception_is_in_the_log(tmp_path):
     assert log.endswith("RuntimeError: no convergence\n")
 
 
-def test_progress_is_plain_lines_in_the_log_and_a_bar_on_a_terminal(tmp_path):
-    code = "report = progress('settle', 'steps')\nreport(1, 2)\nreport(2, 2)"
-    main, terminal = pty.openpty()
-    _, log = run(tmp_path, code, stderr=terminal)
-    os.close(terminal)
-    shown = os.read(main, 10_000).decode()
-    os.close(main)
-    assert "2/2" in shown
-    assert "settle: 2 of 2 steps" in log
-    assert "\r" not in log
-
-
-def test_nothing_but_the_log_gets_progress_where_there_is_no_terminal(tmp_path):
+def test_progress_is_plain_lines_in_the_log_alone(tmp_path):
     with open(tmp_path / "stderr", "w+") as stderr:
         _, log = run(tmp_path, "progress('settle')(5, 5)", stderr=stderr)
         stderr.seek(0)

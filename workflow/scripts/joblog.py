@@ -1,4 +1,4 @@
-"""Where a job's words go: into the log of its rule, with the progress bar left on the terminal.
+"""Where a job's words go: into the log of its rule.
 
 Every script begins here, so here is also what all jobs have in common at their beginning and end:
 inputs are checked, outputs get their checksums, and a job that stops says why.
@@ -21,13 +21,12 @@ def start(job) -> Callable[..., Callable[[int, int], None]]:
 
     An uncaught exception goes there as well, because it is printed last. Returns a function
     `progress(label, unit)`, which makes the callback that library functions report to: it writes
-    lines to the log and, where standard error was a terminal, draws a bar there.
+    lines to the log, where what shows the whole run finds them.
 
     `job` is what Snakemake hands to a script. Its inputs are compared with their checksums, its
     outputs get theirs when the script has come to its end. Raises DamageError for an input that
     is not what its own job wrote.
     """
-    terminal = os.fdopen(os.dup(2), "w", buffering=1)
     with open(job.log[0], "w", encoding="utf-8") as file:
         for stream in (sys.stdout, sys.stderr):
             stream.flush()
@@ -39,18 +38,7 @@ def start(job) -> Callable[..., Callable[[int, int], None]]:
         remove_leftovers(path)
     checksums.check(job.input)
 
-    def progress(label: str, unit: str = "items") -> Callable[[int, int], None]:
-        reports = [Progress(label, unit).report]
-        if terminal.isatty():
-            reports.append(Progress(label, unit, stream=terminal).report)
-
-        def report(done: int, total: int) -> None:
-            for each in reports:
-                each(done, total)
-
-        return report
-
-    return progress
+    return lambda label, unit="items": Progress(label, unit).report
 
 
 def _end_with_a_sentence(job) -> None:

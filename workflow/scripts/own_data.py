@@ -9,7 +9,7 @@ from dustfall.dataset import summary, write
 from dustfall.files import atomic
 from dustfall.own_data import read_own_data
 
-joblog.start(snakemake.log[0])
+joblog.start(snakemake)
 
 source = Path(snakemake.input.file)
 dataset, reynolds = read_own_data(source)

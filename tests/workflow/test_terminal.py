@@ -1,0 +1,104 @@
+"""What a terminal shows of a run: a line with the time to go, and last the reason of a failure."""
+
+import os
+import pty
+import re
+import subprocess
+import sys
+
+import pytest
+
+from tests.workflow.conftest import Project
+from workflow.terminal import Job, Run, duration, last_line, progress_of
+
+
+def on_a_terminal(project: Project, *arguments: str) -> list[str]:
+    """Lines that a terminal is left with, each as its last overwriting has it."""
+    main, terminal = pty.openpty()
+    run = subprocess.Popen(
+        [sys.executable, "-m", "snakemake", *arguments],
+        cwd=project.folder,
+        stdin=subprocess.DEVNULL,
+        stdout=terminal,
+        stderr=terminal,
+    )
+    os.close(terminal)
+    shown = b""
+    while True:
+        try:
+            shown += os.read(main, 65536)
+        except OSError:  # the other end is closed
+            break
+    run.wait()
+    os.close(main)
+    text = re.sub(r"\x1b\[\d*m", "", shown.decode())
+    return [line.split("\x1b[K")[-1] for line in text.replace("\r\n", "\n").splitlines()]
+
+
+def test_a_run_leaves_a_line_of_its_jobs_and_a_failure_its_reason_last(project):
+    table = "x1,y1,z1,x2,y2,z2,x3,y3,z3,fx,fy,fz\n"
+    table += "".join(f"1.{row},2,3,4,5,6,7,8,9,1,2,inf\n" for row in range(100, 200))
+    (project.folder / "own.csv").write_text(table)
+    arguments = ("--configfile", "config/smoke.yaml", "--config", "dataset={file: own.csv}", "--")
+    lines = on_a_terminal(project, *arguments, "results/config.yaml")
+    assert "1 of 1 jobs done" in lines
+    assert len(lines) < 12
+    lines = on_a_terminal(project, *arguments, "results/dataset/forces.h5")
+    assert lines[-1].startswith("Stopped: own_data: own.csv: force of scene 0")
+    assert "\x1b" not in lines[-1]
+    assert len(lines) < 20
+
+
+def run_of(seconds: float, jobs: int, cores: int) -> Run:
+    """A run of equal jobs, of which as many as there are cores are done and as many begun."""
+    run = Run()
+    run.waiting["settle"] = jobs
+    for number in range(2 * cores):
+        run.start(number, Job("settle", f"settle {number}", [], since=0.0))
+    for number in range(cores):
+        run.finish(number, now=seconds)
+    for job in run.running.values():
+        job.since = seconds
+    return run
+
+
+@pytest.mark.parametrize("cores", [1, 2, 5])
+def test_the_time_to_go_of_equal_jobs_is_what_they_take(cores):
+    run = run_of(seconds=30.0, jobs=10 * cores, cores=cores)
+    assert run.seconds_to_go(now=30.0) == pytest.approx(9 * 30.0)
+    assert run.seconds_to_go(now=45.0) == pytest.approx(8.5 * 30.0)
+    assert run.total == 10 * cores
+
+
+def test_a_job_that_is_tried_again_counts_once():
+    run = run_of(seconds=1.0, jobs=4, cores=1)
+    run.fail(1)
+    assert (run.total, run.waiting["settle"]) == (4, 3)
+    run.start(1, Job("settle", "settle 1", [], since=2.0))
+    run.finish(1, now=3.0)
+    assert (run.total, run.done) == (4, 2)
+
+
+@pytest.mark.parametrize(
+    ("line", "share"),
+    [
+        ("n100: 5 of 20 steps, 3 a second, 5 s to go", 0.25),
+        ("streamwise 10/10: 60 of 60 epochs, 9 a second, 0 s to go", 1.0),
+        ("ValueError: 3 of them are missing", None),
+        ("", None),
+    ],
+)
+def test_the_share_of_a_job_is_read_from_the_end_of_its_log(tmp_path, line, share):
+    log = tmp_path / "job.log"
+    log.write_text(f"begun\n{line}\n")
+    assert progress_of([str(log)]) == share
+
+
+def test_a_log_that_is_not_there_says_nothing(tmp_path):
+    assert last_line([]) == last_line([str(tmp_path / "none.log")]) == ""
+
+
+def test_times_are_rounded_to_what_is_known():
+    assert [duration(s) for s in (0, 44, 89, 3599, 4800)] == [
+        "10 s", "40 s", "1 min", "1 h 0 min", "1 h 20 min",
+    ]  # fmt: skip
