@@ -63,6 +63,7 @@ include: "workflow/rules/sedimentation.smk"
 include: "workflow/rules/exports.smk"
 include: "workflow/rules/analysis.smk"
 include: "workflow/rules/figures.smk"
+include: "workflow/rules/tables.smk"
 include: "workflow/rules/benchmarks.smk"
 include: "workflow/rules/studies.smk"
 
@@ -79,6 +80,7 @@ rule all:
         "results/analysis/independence_of_n.csv",
         "results/analysis/neighbour_changes.csv",
         "results/model/ablation.csv",
+        rules.tables.output,
         FIGURES,
 
 
@@ -112,16 +114,13 @@ rule studies:
         "results/studies/neighbour_numbers.csv",
 
 
-localrules:
-    configuration,
-
-
 rule configuration:
     """Write down the configuration of this run, with every default."""
     output:
         "results/config.yaml",
     log:
         "logs/configuration.log",
+    localrule: True
     params:
         config=json.dumps(config),
     script:

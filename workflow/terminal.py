@@ -254,13 +254,14 @@ class _Quiet(logging.Filter):
 def follow(workflow) -> Terminal:
     """Show a run of jobs by one line in place of Snakemake's words.
 
-    They stay as they are in a dry run, in the processes of single jobs, and where --quiet,
-    --verbose or a logger plugin says otherwise.
+    They stay as they are in a dry run, in the processes of single jobs, in a workflow of which this
+    one is a module, and where --quiet, --verbose or a logger plugin says otherwise.
     """
     settings, terminal = workflow.output_settings, Terminal(sys.stderr)
     own_words = settings.dryrun or settings.quiet or settings.verbose
     handlers = [handler for handler in logger.handlers if handler.name == "DefaultStreamHandler"]
-    if workflow.is_main_process and handlers and not own_words:
+    own_run = workflow.is_main_process and workflow.modifier.is_main_snakefile()
+    if own_run and handlers and not own_words:
         handlers[0].addFilter(_Quiet(terminal))
         logger.addHandler(terminal)
         atexit.register(terminal.stop)

@@ -75,6 +75,7 @@ def test_the_paper_takes_the_expected_jobs_and_fewer_than_a_thousand(project):
         # The long cases and the Galileo numbers.
         "voronoi_cells": (3 + 1) * 6 + 3,
         "random_spheres": 1,
+        "tables": 1,
         **{f"figure_{name}": 1 for name in FIGURES},
     }
     assert jobs == expected

@@ -1,24 +1,13 @@
-# Beside Snakemake, not on a cluster.
-localrules:
-    data_summary,
-    steady_state,
-    independence_of_n,
-    neighbour_changes,
-
-
 rule data_summary:
     """What the paper states of its forces, and all rank correlations, for each radial law."""
     input:
         data="results/dataset/forces.h5",
     output:
         json="results/dataset/summary.json",
-        forces=report(
-            "results/analysis/force_summary.csv",
-            category="Data set",
-            caption="../report/force_summary.rst",
-        ),
+        forces="results/analysis/force_summary.csv",
     log:
         "logs/data_summary.log",
+    localrule: True
     params:
         library=library("data_summary.py"),
         radial_law=plan.figure_law(config),
@@ -47,13 +36,10 @@ rule steady_state:
     input:
         series=expand("results/sedimentation/{case}.series.nc", case=SETTLED_CASES),
     output:
-        report(
-            "results/analysis/steady_state.csv",
-            category="Sedimentation",
-            caption="../report/steady_state.rst",
-        ),
+        "results/analysis/steady_state.csv",
     log:
         "logs/analysis/steady_state.log",
+    localrule: True
     params:
         library=library("steady_state.py"),
         starts=[plan.statistics_from(config, case) for case in SETTLED_CASES],
@@ -66,13 +52,10 @@ rule independence_of_n:
     input:
         steady="results/analysis/steady_state.csv",
     output:
-        report(
-            "results/analysis/independence_of_n.csv",
-            category="Sedimentation",
-            caption="../report/independence_of_n.rst",
-        ),
+        "results/analysis/independence_of_n.csv",
     log:
         "logs/analysis/independence_of_n.log",
+    localrule: True
     params:
         library=library("independence_of_n.py"),
     script:
@@ -84,13 +67,10 @@ rule neighbour_changes:
     input:
         series=expand("results/sedimentation/{case}.series.nc", case=NEIGHBOUR_CASES),
     output:
-        report(
-            "results/analysis/neighbour_changes.csv",
-            category="Sedimentation",
-            caption="../report/neighbour_changes.rst",
-        ),
+        "results/analysis/neighbour_changes.csv",
     log:
         "logs/analysis/neighbour_changes.log",
+    localrule: True
     params:
         library=library("neighbour_changes.py"),
         starts=[plan.statistics_from(config, case) for case in NEIGHBOUR_CASES],

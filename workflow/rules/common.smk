@@ -1,4 +1,5 @@
-# What the rule files share.
+# What the rule files share. Rules whose jobs take seconds are local: where the others go to a cluster
+# they run beside Snakemake.
 
 
 wildcard_constraints:
@@ -28,16 +29,80 @@ def settling_library(model):
     return digest(files)
 
 
+# What the report calls figures and tables, and the heading that they stand under; others have the
+# name of their file.
+TITLES = {
+    "mesh_study": ("Meshes", "Drag against mesh size"),
+    "scene_meshes": ("Meshes", "Meshes of two scenes"),
+    "audit": ("Accuracy", "Two methods compared"),
+    "dataset": ("Scenes", "Scenes and forces by decade"),
+    "force_summary": ("Forces", "What the paper states of its forces"),
+    "force_scatter": ("Forces", "Force against volume fraction"),
+    "force_pdf": ("Forces", "Densities of the force"),
+    "spearman": ("Forces", "Rank correlation with the neighbours"),
+    "sweep": ("Choice", "Cross-validation of the layers"),
+    "learning_curve": ("Choice", "Scores against training scenes"),
+    "ablation": ("Choice", "What each change brings"),
+    "evaluation": ("Scores", "Scores on test scenes"),
+    "symmetries": ("Scores", "Broken symmetries"),
+    "predicted_vs_target": ("Scores", "Predicted against target force"),
+    "error_by_distance": ("Scores", "Error against the nearest gap"),
+    "accuracy_vs_cost": ("Scores", "Score against run time"),
+    "steady_state": ("Averages", "Averages of the steady state"),
+    "inverse_beta": ("Averages", "Settling velocity against volume fraction"),
+    "independence_of_n": ("Averages", "Dependence on the number of particles"),
+    "neighbour_changes": ("Averages", "Changes of neighbours"),
+    "frozen_cloud": ("Averages", "Frozen clouds: five neighbours and all"),
+    "settling_in_time": ("In time", "Mean and variance in time"),
+    "trajectories": ("In time", "Paths of three particles"),
+    "trajectories_3d": ("In time", "Paths in space"),
+    "settling_cloud": ("In time", "A cloud as it settles"),
+    "phase_and_spectra": ("Fluctuations", "Phase diagrams and spectra"),
+    "cloud_spectra": ("Fluctuations", "Spectra of all particles"),
+    "ergodicity": ("Fluctuations", "Time and ensemble averages"),
+    "voronoi_pdf": ("Clustering", "Densities of Voronoi volumes"),
+    "voronoi_variance": ("Clustering", "Variance of Voronoi volumes"),
+}
+
+
+def reported(path, name, category, kind):
+    """A file that the report shows, with its caption, heading and title."""
+    heading, title = TITLES.get(name, (kind.capitalize(), name.replace("_", " ")))
+    return report(
+        path,
+        category=category,
+        subcategory=heading,
+        labels={kind: title},
+        caption=f"../report/{name}.rst",
+    )
+
+
 def figure(name, category):
     """Outputs of a figure: the picture for the report, the one for print, the numbers drawn."""
     stem = f"results/figures/{name}"
-    caption = f"../report/{name}.rst"
     return {
-        "png": report(f"{stem}.png", category=category, caption=caption),
+        "png": reported(f"{stem}.png", name, category, "figure"),
         "pdf": f"{stem}.pdf",
         "csv": f"{stem}.csv",
     }
 
+
+# Tables that the report shows: the file of each, and its category.
+TABLES = {
+    "audit": ("results/analysis/audit.csv", "Stokes solver"),
+    "dataset": ("results/dataset/summary.csv", "Data set"),
+    "force_summary": ("results/analysis/force_summary.csv", "Data set"),
+    "sweep": ("results/sweep/summary.csv", "Force models"),
+    "learning_curve": ("results/model/learning_curve.csv", "Force models"),
+    "ablation": ("results/model/ablation.csv", "Force models"),
+    "evaluation": ("results/model/evaluation.csv", "Force models"),
+    "symmetries": ("results/model/symmetries.csv", "Force models"),
+    "steady_state": ("results/analysis/steady_state.csv", "Sedimentation"),
+    "independence_of_n": ("results/analysis/independence_of_n.csv", "Sedimentation"),
+    "neighbour_changes": ("results/analysis/neighbour_changes.csv", "Sedimentation"),
+}
+if config["dataset"]["file"]:
+    del TABLES["audit"]
 
 SHARDS = plan.shards(config)
 TRIALS = plan.trials(config)

@@ -5,11 +5,7 @@ rule dataset:
         solutions=expand("results/stokes/{shard}.h5", shard=SHARDS),
     output:
         data="results/dataset/forces.h5",
-        summary=report(
-            "results/dataset/summary.csv",
-            category="Data set",
-            caption="../report/dataset.rst",
-        ),
+        summary="results/dataset/summary.csv",
     log:
         "logs/dataset.log",
     benchmark:

@@ -1,26 +1,3 @@
-# Beside Snakemake, not on a cluster.
-localrules:
-    figure_force_scatter,
-    figure_force_pdf,
-    figure_spearman,
-    figure_predicted_vs_target,
-    figure_error_by_distance,
-    figure_learning_curve,
-    figure_inverse_beta,
-    figure_settling_in_time,
-    figure_phase_and_spectra,
-    figure_cloud_spectra,
-    figure_ergodicity,
-    figure_trajectories,
-    figure_trajectories_3d,
-    movie,
-    figure_voronoi_pdf,
-    figure_voronoi_variance,
-    figure_mesh_study,
-    figure_audit,
-    figure_scene_meshes,
-
-
 rule figure_force_scatter:
     """Force components against volume fraction."""
     input:
@@ -29,6 +6,7 @@ rule figure_force_scatter:
         **figure("force_scatter", "Data set"),
     log:
         "logs/figures/force_scatter.log",
+    localrule: True
     params:
         library=library("figure_force_scatter.py"),
         radial_law=plan.figure_law(config),
@@ -45,6 +23,7 @@ rule figure_force_pdf:
         **figure("force_pdf", "Data set"),
     log:
         "logs/figures/force_pdf.log",
+    localrule: True
     params:
         library=library("figure_force_pdf.py"),
         radial_law=plan.figure_law(config),
@@ -60,6 +39,7 @@ rule figure_spearman:
         **figure("spearman", "Data set"),
     log:
         "logs/figures/spearman.log",
+    localrule: True
     params:
         library=library("figure_spearman.py"),
         radial_law=plan.figure_law(config),
@@ -75,6 +55,7 @@ rule figure_predicted_vs_target:
         **figure("predicted_vs_target", "Force models"),
     log:
         "logs/figures/predicted_vs_target.log",
+    localrule: True
     params:
         library=library("figure_predicted_vs_target.py"),
         radial_law=plan.figure_law(config),
@@ -91,6 +72,7 @@ rule figure_error_by_distance:
         **figure("error_by_distance", "Force models"),
     log:
         "logs/figures/error_by_distance.log",
+    localrule: True
     params:
         library=library("figure_error_by_distance.py"),
     script:
@@ -105,6 +87,7 @@ rule figure_learning_curve:
         **figure("learning_curve", "Force models"),
     log:
         "logs/figures/learning_curve.log",
+    localrule: True
     params:
         library=library("figure_learning_curve.py"),
     script:
@@ -119,6 +102,7 @@ rule figure_inverse_beta:
         **figure("inverse_beta", "Sedimentation"),
     log:
         "logs/figures/inverse_beta.log",
+    localrule: True
     params:
         library=library("figure_inverse_beta.py"),
     script:
@@ -134,6 +118,7 @@ rule figure_settling_in_time:
         **figure("settling_in_time", "Sedimentation"),
     log:
         "logs/figures/settling_in_time.log",
+    localrule: True
     params:
         library=library("figure_settling_in_time.py"),
     script:
@@ -148,6 +133,7 @@ rule figure_phase_and_spectra:
         **figure("phase_and_spectra", "Sedimentation"),
     log:
         "logs/figures/phase_and_spectra.log",
+    localrule: True
     params:
         library=library("figure_phase_and_spectra.py"),
         statistics_from=config["sedimentation"]["statistics_from"],
@@ -165,6 +151,7 @@ rule figure_cloud_spectra:
         **figure("cloud_spectra", "Sedimentation"),
     log:
         "logs/figures/cloud_spectra.log",
+    localrule: True
     params:
         library=library("figure_cloud_spectra.py"),
         starts=[plan.statistics_from(config, case) for case in SETTLED_LARGEST_CASES],
@@ -181,6 +168,7 @@ rule figure_ergodicity:
         **figure("ergodicity", "Sedimentation"),
     log:
         "logs/figures/ergodicity.log",
+    localrule: True
     params:
         library=library("figure_ergodicity.py"),
         starts=[plan.statistics_from(config, case) for case in SETTLED_LARGEST_CASES],
@@ -196,6 +184,7 @@ rule figure_trajectories:
         **figure("trajectories", "Sedimentation"),
     log:
         "logs/figures/trajectories.log",
+    localrule: True
     params:
         library=library("figure_trajectories.py"),
     script:
@@ -210,6 +199,7 @@ rule figure_trajectories_3d:
         **figure("trajectories_3d", "Sedimentation"),
     log:
         "logs/figures/trajectories_3d.log",
+    localrule: True
     params:
         library=library("figure_trajectories_3d.py"),
     script:
@@ -221,15 +211,12 @@ rule movie:
     input:
         trajectory=f"results/sedimentation/{GALILEO_CASES[0]}.nc",
     output:
-        report(
-            "results/figures/settling_cloud.gif",
-            category="Sedimentation",
-            caption="../report/settling_cloud.rst",
-        ),
+        reported("results/figures/settling_cloud.gif", "settling_cloud", "Sedimentation", "film"),
     log:
         "logs/figures/settling_cloud.log",
     benchmark:
         "benchmarks/figures/settling_cloud.tsv"
+    localrule: True
     params:
         library=library("movie.py"),
         pictures=config["figures"]["movie_pictures"],
@@ -247,6 +234,7 @@ rule figure_voronoi_pdf:
         "logs/figures/voronoi_pdf.log",
     benchmark:
         "benchmarks/figures/voronoi_pdf.tsv"
+    localrule: True
     params:
         library=library("figure_voronoi_pdf.py"),
         seed=config["seed"],
@@ -266,6 +254,7 @@ rule figure_voronoi_variance:
         "logs/figures/voronoi_variance.log",
     benchmark:
         "benchmarks/figures/voronoi_variance.tsv"
+    localrule: True
     params:
         library=library("figure_voronoi_variance.py"),
         seed=config["seed"],
@@ -299,6 +288,7 @@ rule figure_mesh_study:
         **figure("mesh_study", "Stokes solver"),
     log:
         "logs/figures/mesh_study.log",
+    localrule: True
     params:
         library=library("figure_mesh_study.py"),
     script:
@@ -313,6 +303,7 @@ rule figure_audit:
         **figure("audit", "Stokes solver"),
     log:
         "logs/figures/audit.log",
+    localrule: True
     params:
         library=library("figure_audit.py"),
     script:
@@ -327,6 +318,7 @@ rule figure_scene_meshes:
         **figure("scene_meshes", "Stokes solver"),
     log:
         "logs/figures/scene_meshes.log",
+    localrule: True
     params:
         library=library("figure_scene_meshes.py"),
         tolerance=config["stokes"]["tolerance"],

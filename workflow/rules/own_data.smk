@@ -4,11 +4,7 @@ rule own_data:
         file=config["dataset"]["file"],
     output:
         data="results/dataset/forces.h5",
-        summary=report(
-            "results/dataset/summary.csv",
-            category="Data set",
-            caption="../report/dataset.rst",
-        ),
+        summary="results/dataset/summary.csv",
     log:
         "logs/dataset.log",
     params:

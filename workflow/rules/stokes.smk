@@ -39,11 +39,7 @@ rule audit:
         scenes=expand("results/scenes/{shard}.h5", shard=SHARDS),
         solutions=expand("results/stokes/{shard}.h5", shard=SHARDS),
     output:
-        report(
-            "results/analysis/audit.csv",
-            category="Stokes solver",
-            caption="../report/audit.rst",
-        ),
+        "results/analysis/audit.csv",
     log:
         "logs/analysis/audit.log",
     benchmark:

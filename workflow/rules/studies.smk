@@ -1,9 +1,3 @@
-# Beside Snakemake, not on a cluster.
-localrules:
-    step_size,
-    neighbour_numbers,
-
-
 rule study_of_a_step:
     """Let a small cloud settle with one of the time steps that are compared."""
     input:
@@ -52,6 +46,7 @@ rule step_size:
         "results/studies/step_size.csv",
     log:
         "logs/studies/step_size.log",
+    localrule: True
     params:
         library=library("step_size.py"),
         statistics_from=config["studies"]["statistics_from"],
@@ -106,6 +101,7 @@ rule neighbour_numbers:
         "results/studies/neighbour_numbers.csv",
     log:
         "logs/studies/neighbour_numbers.log",
+    localrule: True
     params:
         library=library("neighbour_numbers.py"),
         starts=[

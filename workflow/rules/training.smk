@@ -1,11 +1,3 @@
-# Jobs that take seconds run beside Snakemake where the others go to a cluster.
-localrules:
-    winner,
-    learning_curve,
-    ablation,
-    evaluation,
-
-
 rule sweep:
     """Cross-validate one configuration of layers for one component."""
     input:
@@ -37,12 +29,11 @@ rule winner:
     input:
         results=expand("results/sweep/{trial}.json", trial=TRIALS),
     output:
-        table=report(
-            "results/sweep/summary.csv", category="Force models", caption="../report/sweep.rst"
-        ),
+        table="results/sweep/summary.csv",
         winner="results/sweep/winner.json",
     log:
         "logs/winner.log",
+    localrule: True
     params:
         library=library("winner.py"),
     script:
@@ -105,13 +96,10 @@ rule learning_curve:
     input:
         expand("results/trials/{trial}.csv", trial=plan.learning_curve(config)),
     output:
-        report(
-            "results/model/learning_curve.csv",
-            category="Force models",
-            caption="../report/learning_curve.rst",
-        ),
+        "results/model/learning_curve.csv",
     log:
         "logs/learning_curve.log",
+    localrule: True
     script:
         "../scripts/trials.py"
 
@@ -121,13 +109,10 @@ rule ablation:
     input:
         expand("results/trials/{trial}.csv", trial=plan.ablation(config)),
     output:
-        report(
-            "results/model/ablation.csv",
-            category="Force models",
-            caption="../report/ablation.rst",
-        ),
+        "results/model/ablation.csv",
     log:
         "logs/ablation.log",
+    localrule: True
     script:
         "../scripts/trials.py"
 
@@ -138,19 +123,12 @@ rule evaluation:
         data="results/dataset/forces.h5",
         models=expand("results/model/{model}.safetensors", model=LEARNED_MODELS),
     output:
-        table=report(
-            "results/model/evaluation.csv",
-            category="Force models",
-            caption="../report/evaluation.rst",
-        ),
-        symmetries=report(
-            "results/model/symmetries.csv",
-            category="Force models",
-            caption="../report/symmetries.rst",
-        ),
+        table="results/model/evaluation.csv",
+        symmetries="results/model/symmetries.csv",
         predictions="results/model/predictions.h5",
     log:
         "logs/evaluation.log",
+    localrule: True
     params:
         library=library("evaluation.py"),
         seed=config["seed"],
