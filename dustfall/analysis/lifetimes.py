@@ -79,9 +79,14 @@ def lifetimes_table(
             correlation = autocorrelation(values)
             lag = interval * np.arange(len(correlation))
             lived = lifetime(lag, correlation)
-            columns = {"quantity": quantity, "lag": lag, "spreading_times": lag / unit}
-            columns |= {"correlation": correlation}
-            columns |= {"lifetime": lived, "lifetime_spreading": lived / unit}
+            columns = {
+                "quantity": quantity,
+                "lag": lag,
+                "spreading_times": lag / unit,
+                "correlation": correlation,
+                "lifetime": lived,
+                "lifetime_spreading": lived / unit,
+            }
             tables.append(pd.DataFrame(case | columns))
         if progress:
             progress(done, len(pairs))
