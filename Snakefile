@@ -79,6 +79,7 @@ rule all:
         "results/model/evaluation.csv",
         "results/analysis/independence_of_n.csv",
         "results/analysis/neighbour_changes.csv",
+        "results/analysis/local_volume_fraction.csv",
         "results/model/ablation.csv",
         rules.tables.output,
         FIGURES,

@@ -261,6 +261,20 @@ def schedule(config: dict, case: str) -> dict[str, float]:
     return short_schedule(config)
 
 
+def compared_closures(config: dict) -> list[str]:
+    """Names of the cases by which closures are compared, one start each, at the densest phi.
+
+    Those of the campaign's model and those of all particles, which last equally long.
+    """
+    settle = config["sedimentation"]
+    densest = max(settle["volume_fractions"])
+    together = settle["all_particles"]["particles"]
+    return [
+        *(Case(n, densest, 1.0).name for n in settle["particles"]),
+        *(Case(n, densest, 1.0, compared=ALL_PARTICLES).name for n in together),
+    ]
+
+
 def short_schedule(config: dict) -> dict[str, float]:
     """Step, duration and time between frames [tau] of a case that lasts as long as the paper's."""
     settle = config["sedimentation"]

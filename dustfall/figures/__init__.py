@@ -1,5 +1,6 @@
 """One function a figure, from the tidy table that is saved beside it to a matplotlib Figure."""
 
+from dustfall.figures.closures import closures, lifetimes
 from dustfall.figures.fluctuations import cloud_spectra, ergodicity
 from dustfall.figures.forces import (
     accuracy_vs_cost,
@@ -24,6 +25,7 @@ from dustfall.figures.voronoi import voronoi_pdf, voronoi_variance
 
 __all__ = [
     "accuracy_vs_cost",
+    "closures",
     "cloud_spectra",
     "ergodicity",
     "error_by_distance",
@@ -32,6 +34,7 @@ __all__ = [
     "frozen_cloud",
     "inverse_beta",
     "learning_curve",
+    "lifetimes",
     "mesh_study",
     "phase_and_spectra",
     "predicted_vs_target",

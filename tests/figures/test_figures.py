@@ -11,6 +11,7 @@ from dustfall.analysis.distributions import force_distributions, force_samples
 from dustfall.analysis.evaluation import error_by_gap
 from dustfall.analysis.mesh_study import mesh_study_table
 from dustfall.analysis.settling import inverse_beta_table
+from dustfall.figures.closures import PANELS
 from dustfall.figures.settling import WINDOWS
 from dustfall.figures.style import (
     PHI_RANGE,
@@ -152,6 +153,20 @@ def phase_and_spectra():
     )
 
 
+def closures():
+    table = waves(lambda t, phi, p: {"x": 1 + t, "y": 1.5 + np.sin(t)})
+    model = table["particle"].map({1: "anchored", 2: "anchored", 3: "all_particles"})
+    table = table[table["volume_fraction"] == PHI[-1]].assign(model=model, low=np.nan, high=np.nan)
+    table["n"] = table["particle"].map({1: 1000, 2: 10000, 3: 1000})
+    return pd.concat([table.assign(panel=name, box=table["n"] / 10) for name in PANELS])
+
+
+def lifetimes():
+    table = waves(lambda t, phi, p: {"spreading_times": t, "correlation": np.exp(-p * t)})
+    quantity = table["particle"].map({1: "membership", 2: "settling velocity", 3: None})
+    return table.assign(quantity=quantity, n=1000).dropna(subset="quantity")
+
+
 def trajectories():
     return waves(
         lambda t, phi, p: {"time": t, "dx": p * phi**0.2 * np.sin(t), "dy": p * t, "dz": -9 * t}
@@ -272,6 +287,8 @@ TABLES = {
         phase_and_spectra,
         cloud_spectra,
         ergodicity,
+        closures,
+        lifetimes,
         trajectories,
         trajectories_3d,
         frozen_cloud,
@@ -303,6 +320,8 @@ XY = {
     "inverse_beta": ("volume_fraction", "value"),
     "cloud_spectra": ("x", "y"),
     "ergodicity": ("window", "spread"),
+    "closures": ("x", "y"),
+    "lifetimes": ("spreading_times", "correlation"),
     "voronoi_pdf": ("volume", "density"),
     "voronoi_variance": ("inverse_beta", "variance"),
     "mesh_study": ("nodes", "force"),

@@ -78,6 +78,26 @@ rule neighbour_changes:
         "../scripts/neighbour_changes.py"
 
 
+rule local_volume_fraction:
+    """Volume fraction around each particle by its fifth neighbour, at the start and when steady."""
+    input:
+        trajectories=expand("results/sedimentation/{case}.nc", case=SETTLED_LARGEST_CASES),
+    output:
+        report(
+            "results/analysis/local_volume_fraction.csv",
+            category="Sedimentation",
+            caption="../report/local_volume_fraction.rst",
+        ),
+    log:
+        "logs/analysis/local_volume_fraction.log",
+    params:
+        library=library("local_volume_fraction.py"),
+        starts=[plan.statistics_from(config, case) for case in SETTLED_LARGEST_CASES],
+        densest=config["scenes"]["phi_max"],
+    script:
+        "../scripts/local_volume_fraction.py"
+
+
 rule voronoi_cells:
     """Volumes of the Voronoi cells in some frames of a case."""
     input:

@@ -117,7 +117,8 @@ CASES = plan.cases(config)
 # The cases that tell the steady state, and those of them among nearest neighbours; the cases of
 # `sedimentation.model` at the Galileo number of the properties that last as long as the paper's,
 # and those that tell the steady state; of either those with most particles, from dilute to dense;
-# and the cases that differ in the Galileo number alone.
+# the largest clouds
+# of which all particles feel each other; and the cases that differ in the Galileo number alone.
 SETTLED_CASES = plan.settled_cases(config)
 NEIGHBOUR_CASES = [name for name in SETTLED_CASES if CASES[name].compared != plan.ALL_PARTICLES]
 PLAIN_CASES = [name for name in CASES if plan.is_plain(CASES[name]) and not CASES[name].long]
@@ -125,6 +126,11 @@ LONG_CASES = [name for name in CASES if plan.is_plain(CASES[name]) and CASES[nam
 SETTLED_PLAIN_CASES = [name for name in SETTLED_CASES if plan.is_plain(CASES[name])]
 LARGEST_CASES = plan.largest_cases(config, [])
 SETTLED_LARGEST_CASES = plan.largest_cases(config, config["sedimentation"]["long"]["particles"])
+TOGETHER_CASES = [
+    plan.Case(n, phi, 1.0, compared=plan.ALL_PARTICLES).name
+    for n in config["sedimentation"]["all_particles"]["particles"][-1:]
+    for phi in sorted(config["sedimentation"]["volume_fractions"])
+]
 GALILEO_CASES = [
     name
     for name, case in CASES.items()
@@ -162,10 +168,13 @@ FIGURES = expand(
         "voronoi_variance",
         "cloud_spectra",
         "ergodicity",
+        "lifetimes",
+        "closures",
         "trajectories",
         "trajectories_3d",
         "frozen_cloud",
         *SOLVER_FIGURES,
+        *["trajectories_all_particles"] * bool(TOGETHER_CASES),
     ],
     ending=["png", "pdf", "csv"],
 ) + ["results/figures/settling_cloud.gif"]

@@ -176,6 +176,55 @@ rule figure_ergodicity:
         "../scripts/figure_ergodicity.py"
 
 
+rule figure_lifetimes:
+    """How long particles keep their velocity and their place in a cluster."""
+    input:
+        trajectories=expand("results/sedimentation/{case}.nc", case=SETTLED_LARGEST_CASES),
+    output:
+        **figure("lifetimes", "Sedimentation"),
+    log:
+        "logs/figures/lifetimes.log",
+    benchmark:
+        "benchmarks/figures/lifetimes.tsv"
+    params:
+        library=library("figure_lifetimes.py"),
+        starts=[plan.statistics_from(config, case) for case in SETTLED_LARGEST_CASES],
+    script:
+        "../scripts/figure_lifetimes.py"
+
+
+rule figure_closures:
+    """Five neighbours and all particles, in boxes of several sizes, at the densest phi."""
+    input:
+        series=expand("results/sedimentation/{case}.series.nc", case=plan.compared_closures(config)),
+        trajectories=expand("results/sedimentation/{case}.nc", case=plan.compared_closures(config)),
+        cells=expand("results/analysis/voronoi/{case}.nc", case=plan.compared_closures(config)),
+    output:
+        **figure("closures", "All particles"),
+    log:
+        "logs/figures/closures.log",
+    params:
+        library=library("figure_closures.py"),
+        seed=config["seed"],
+        statistics_from=config["sedimentation"]["statistics_from"],
+    script:
+        "../scripts/figure_closures.py"
+
+
+rule figure_trajectories_all_particles:
+    """Paths of the tracked particles where all feel each other."""
+    input:
+        series=expand("results/sedimentation/{case}.series.nc", case=TOGETHER_CASES),
+    output:
+        **figure("trajectories_all_particles", "All particles"),
+    log:
+        "logs/figures/trajectories_all_particles.log",
+    params:
+        library=library("figure_trajectories.py"),
+    script:
+        "../scripts/figure_trajectories.py"
+
+
 rule figure_trajectories:
     """Paths of the tracked particles, unwrapped."""
     input:
