@@ -13,7 +13,7 @@ GMSH_LIBRARIES := libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 libgomp1
 CAN_INSTALL := [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null
 APT_INSTALL := apt-get update && apt-get install -y --no-install-recommends
 
-.PHONY: run shell test slurm-test openfoam openfoam-test tools-test environment lock \
+.PHONY: run shell test slurm-test fault-test openfoam openfoam-test tools-test environment lock \
 	gmsh-libraries clean-environment
 
 run: environment
@@ -26,7 +26,7 @@ shell: environment
 
 test: environment
 	$(VENV)/bin/python -m pytest -n auto --dist loadfile --no-loadscope-reorder \
-		-m "not openfoam and not slurm and not tools"
+		-m "not openfoam and not slurm and not tools and not faults"
 
 # Wants root and Debian's SLURM, which it installs where it can; else the tests say what is missing.
 slurm-test: environment
@@ -34,6 +34,11 @@ slurm-test: environment
 	@command -v slurmctld >/dev/null || ! { $(CAN_INSTALL); } || \
 		{ $(APT_INSTALL) slurm-wlm munge; } >/dev/null
 	$(VENV)/bin/python -m pytest tests/slurm -rs -s
+
+# Kills, full disks and damage by the hundred, on a machine that is otherwise idle; their counts go
+# into the table of docs/faults.md.
+fault-test: environment
+	FAULT_TABLE=docs/faults.csv $(VENV)/bin/python -m pytest tests/faults -m faults
 
 openfoam:
 	openfoam/build.sh

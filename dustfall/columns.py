@@ -56,7 +56,7 @@ def read_columns(
     try:
         with h5py.File(path) as file:
             for name in (*names, *(name for name in optional if name in file)):
-                array = file[name][()]
+                array = _stored(file, name)[()]
                 if file[name].attrs["sha256"] != _checksum(array):
                     raise ValueError(f"{name} does not match its checksum")
                 text = array.dtype.kind == "S"
@@ -69,6 +69,27 @@ def read_columns(
             "what makes it"
         ) from error
     return found
+
+
+def _stored(file: h5py.File, name: str) -> h5py.Dataset:
+    """A column that lies in the file itself, plainly, so that it takes no more memory than that.
+
+    Raises ValueError for a link to another file or a part of one, for objects of any length, and
+    for numbers that the file only claims to have, or has packed.
+    """
+    link = file.get(name, getlink=True)
+    if link is None:
+        raise ValueError(f"it has no column {name}")
+    column = file[name] if isinstance(link, h5py.HardLink) else None
+    if (
+        not isinstance(column, h5py.Dataset)
+        or column.is_virtual
+        or column.external
+        or column.dtype.kind == "O"
+        or column.nbytes > file.id.get_filesize()
+    ):
+        raise ValueError(f"{name} is no plain column of it")
+    return column
 
 
 def started_checksum(dtype: np.dtype, shape: tuple[int, ...]):

@@ -21,6 +21,9 @@ FORMAT = "dustfall force model"
 VERSION = 4
 SHIPPED = Path(__file__).parent / "data" / "anchored.safetensors"
 
+MOST_BYTES = 2**30
+"""Of a model file: a hundred million weights."""
+
 ACTIVATION = {"streamwise": "relu", "lateral": "tanh"}
 """Activation of each component's hidden layers (paper, section "Deterministic model")."""
 
@@ -186,12 +189,14 @@ def load_model(path=None) -> LearnedModel:
     if not path.is_file():
         what = "the anchored model that ships with dustfall" if shipped else "force model"
         raise FileNotFoundError(f"{what} not found: there is no file {path}")
+    if path.stat().st_size > MOST_BYTES:
+        raise ValueError(f"{path} has {path.stat().st_size} bytes: allowed are {MOST_BYTES}")
     try:
         with safe_open(path, framework="numpy") as file:
             metadata = file.metadata() or {}
             header = json.loads(metadata.get("header", "null"))
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-    except (SafetensorError, json.JSONDecodeError) as error:
+    except (SafetensorError, ValueError, RecursionError) as error:
         raise ValueError(f"{path} is damaged or no safetensors file: {error}") from error
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise ValueError(f"{path} is a safetensors file, but holds no {FORMAT}")

@@ -45,8 +45,14 @@ def _end_with_a_sentence(job) -> None:
     """Seal the outputs of a job that ends well; have any other end with one sentence."""
 
     def seal() -> None:
-        if all(map(os.path.exists, job.output)):
+        if not all(map(os.path.exists, job.output)):
+            return
+        try:
             checksums.seal(job.output)
+        except OSError as error:
+            # Python would go on from here to a good end.
+            stops.note(f"{job.rule}: {stops.sentence(error)}")
+            os._exit(1)
 
     def fail(kind, error, trace) -> None:
         atexit.unregister(seal)

@@ -1,0 +1,161 @@
+"""What the fault tests share: a whole campaign, damage, a judge that outlives a crash, a ledger.
+
+The full campaign of faults is `make fault-test`, which writes its counts into docs/faults.md. On a
+slow machine environment variables make it smaller: FAULT_KILLS, FAULT_TARGET (what the campaign
+makes), FAULT_FLIPS. The table says how many were tried.
+"""
+
+import csv
+import multiprocessing
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.workflow.conftest import Project
+
+KILLS = int(os.environ.get("FAULT_KILLS", "100"))
+FLIPS = int(os.environ.get("FAULT_FLIPS", "20"))
+TARGET = os.environ.get("FAULT_TARGET", "all").split()
+TABLE = os.environ.get("FAULT_TABLE")
+"""File that the counts are written to, if any."""
+
+SMOKE = ("--configfile", "config/smoke.yaml")
+
+OUTCOMES = ("detected", "healed", "harmless", "silent", "crashed")
+"""Told by a sentence; undone by itself, to the same bits; of no effect on what is read; of an
+effect and not told; a signal, a hang, or an error that nobody wrote a sentence for."""
+
+LONGEST = 60.0
+"""Seconds after which a reader counts as hung."""
+
+MOST_BYTES = 2 * 2**30
+"""Memory that a reader may ask for, beyond what Python and its libraries have."""
+
+
+@pytest.fixture(scope="session")
+def ledger() -> Iterator[dict[str, Counter]]:
+    """Counts of outcomes by what was tried; the table takes them up at the end."""
+    counts: dict[str, Counter] = {}
+    yield counts
+    if TABLE:
+        write_table(Path(TABLE), counts)
+
+
+def write_table(path: Path, counts: dict[str, Counter]) -> None:
+    """Put rows into the table, those of the same name in place of what is there."""
+    rows = {}
+    if path.exists():
+        with open(path, newline="") as file:
+            rows = {row["fault"]: row for row in csv.DictReader(file)}
+    for fault, count in counts.items():
+        found = {outcome: count[outcome] for outcome in OUTCOMES}
+        rows[fault] = {"fault": fault, "tried": sum(found.values()), **found}
+    with open(path, "w", newline="") as file:
+        writer = csv.DictWriter(file, ["fault", "tried", *OUTCOMES], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows.values())
+
+
+def damages(whole: bytes, flips: int, seed: int) -> Iterator[bytes]:
+    """The content of a file cut, emptied, and with single bits flipped at random."""
+    yield whole[: len(whole) // 2]
+    yield b""
+    rng = np.random.default_rng(seed)
+    for _ in range(flips):
+        damaged = bytearray(whole)
+        damaged[rng.integers(len(whole))] ^= 1 << rng.integers(8)
+        yield bytes(damaged)
+
+
+def judge(read: Callable[[], object], same: Callable[[object], bool], names: str) -> str:
+    """Outcome of reading, in a process of its own: a refusal has to be one line that `names` it."""
+    receiver, sender = multiprocessing.Pipe(duplex=False)
+    child = multiprocessing.get_context("fork").Process(target=_read, args=(read, same, sender))
+    child.start()
+    sender.close()
+    try:
+        found = receiver.recv() if receiver.poll(LONGEST) else "hung"
+    except EOFError:
+        found = "died"
+    if child.is_alive():
+        child.join(5)
+        child.kill()
+    child.join()
+    if found in ("harmless", "silent"):
+        return found
+    kind, _, words = found.partition(": ")
+    told = kind in ("ValueError", "FileNotFoundError") and names in words and "\n" not in words
+    return "detected" if told else f"crashed ({found})"
+
+
+def _read(read, same, sender) -> None:
+    import resource
+
+    now = int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
+    resource.setrlimit(resource.RLIMIT_AS, (now + MOST_BYTES, now + MOST_BYTES))
+    try:
+        found = "harmless" if same(read()) else "silent"
+    except BaseException as error:
+        found = f"{type(error).__name__}: {error}"
+    sender.send(found)
+
+
+def count(ledger: dict[str, Counter], fault: str, outcomes: list[str]) -> None:
+    """Enter outcomes; none may be silent or a crash."""
+    ledger.setdefault(fault, Counter()).update(outcome.split(" ")[0] for outcome in outcomes)
+    bad = [outcome for outcome in outcomes if outcome.startswith(("silent", "crashed"))]
+    assert not bad, f"{fault}: {len(bad)} of {len(outcomes)}: {bad[:3]}"
+
+
+@pytest.fixture(scope="session")
+def whole(tmp_path_factory) -> Project:
+    """A campaign that nothing disturbed."""
+    project = Project(tmp_path_factory.mktemp("whole"))
+    project.run(*SMOKE, "--", *TARGET)
+    return project
+
+
+def results(project: Project) -> dict[str, bytes]:
+    """Content of all files of a campaign."""
+    folder = project.folder / "results"
+    files = (path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
+def difference(project: Project, whole: Project) -> list[str]:
+    """Files that two campaigns do not have in common to the last bit."""
+    one, other = results(project), results(whole)
+    return sorted(name for name in one.keys() | other.keys() if one.get(name) != other.get(name))
+
+
+def copy_of(whole: Project, folder: Path) -> Project:
+    """A copy of a campaign with its results, and with what Snakemake knows about them."""
+    project = Project(folder)
+    for name in ("results", ".snakemake"):
+        shutil.copytree(whole.folder / name, folder / name, dirs_exist_ok=True)
+    return project
+
+
+def begin(project: Project, *arguments: str, **streams) -> subprocess.Popen:
+    """Snakemake with its jobs in a process group of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "snakemake", *SMOKE, *arguments],
+        cwd=project.folder,
+        env={key: value for key, value in os.environ.items() if key != "PYTHONPATH"},
+        stdin=subprocess.DEVNULL,
+        start_new_session=True,
+        **{"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL} | streams,
+    )
+
+
+def end(process: subprocess.Popen, number: signal.Signals) -> None:
+    """Send a signal to a whole process group."""
+    os.killpg(process.pid, number)

@@ -1,0 +1,213 @@
+"""A campaign that is killed, interrupted, short of disk or of files goes on to the same bits."""
+
+import os
+import shutil
+import signal
+import subprocess
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.faults.conftest import KILLS, SMOKE, TARGET, begin, copy_of, count, difference, end
+from tests.workflow.conftest import Project
+
+pytestmark = pytest.mark.faults
+
+INTERRUPTIONS = max(2, KILLS // 10)
+
+DISK = 64
+"""Size of the disk that runs full [MiB]: a smoke campaign leaves less than half of it."""
+
+
+@pytest.fixture(scope="module")
+def start_up(whole) -> float:
+    """Seconds that Snakemake needs here until its first job."""
+    began = time.monotonic()
+    whole.dry_run(*SMOKE, "--", *TARGET)
+    return time.monotonic() - began
+
+
+def unlock(project: Project) -> None:
+    """What `snakemake --unlock` does, without its start."""
+    shutil.rmtree(project.folder / ".snakemake/locks", ignore_errors=True)
+
+
+def leftovers(project: Project) -> list[Path]:
+    """Temporary files, copies of scripts and empty folders."""
+    found = [*(project.folder / "results").rglob(".*")]
+    found += (project.folder / ".snakemake/scripts").glob("*")
+    found += (
+        folder
+        for folder, inner, files in os.walk(project.folder / "results")
+        if not inner and not files
+    )
+    return found
+
+
+def finish(project: Project, whole: Project) -> str:
+    unlock(project)
+    project.run(*SMOKE, "--", *TARGET)
+    left = leftovers(project)
+    assert not left, left
+    return "silent" if difference(project, whole) else "healed"
+
+
+def test_a_campaign_killed_at_random_moments_ends_with_the_same_bits(
+    whole, tmp_path, ledger, start_up
+):
+    rng = np.random.default_rng(KILLS)
+    project = Project(tmp_path)
+    killed = runs = 0
+    while killed < KILLS:
+        process = begin(project, "--", *TARGET)
+        try:
+            process.wait(start_up * rng.uniform(0.5, 4.0))
+        except subprocess.TimeoutExpired:
+            end(process, signal.SIGKILL)
+            killed += 1
+        process.wait()
+        unlock(project)
+        if process.returncode == 0:  # at its end before the moment came: once more
+            assert not difference(project, whole)
+            runs += 1
+            shutil.rmtree(project.folder / "results")
+        else:
+            assert process.returncode == -signal.SIGKILL
+    outcome = finish(project, whole)
+    count(ledger, "kill -9 of the process group at a random moment", KILLS * [outcome])
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_campaign_says_why_it_stopped_and_goes_on(
+    whole, tmp_path, ledger, start_up, number
+):
+    rng = np.random.default_rng(number)
+    project, outcomes = Project(tmp_path), []
+    while len(outcomes) < INTERRUPTIONS:
+        # After the start: before it there is no campaign that could stop.
+        process = begin(
+            project, "--", *TARGET, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        )
+        try:
+            words, _ = process.communicate(timeout=start_up * rng.uniform(1.5, 3.0))
+        except subprocess.TimeoutExpired:
+            end(process, number)
+            words, _ = process.communicate()
+        if process.returncode == 0:
+            shutil.rmtree(project.folder / "results")
+            continue
+        last = words.rstrip().splitlines()[-1]
+        told = last.startswith("Stopped: ") and "To go on: snakemake" in last
+        outcomes.append("detected" if told and "Traceback" not in words else f"crashed ({last})")
+    count(ledger, f"{number.name} to the process group", outcomes)
+    count(ledger, f"the same command after {number.name}", [finish(project, whole)])
+
+
+@contextmanager
+def small_disk(folder: Path):
+    """A disk of its own in place of a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    done = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", f"size={DISK}m", "none", folder], capture_output=True
+    )
+    if done.returncode:
+        pytest.skip("no right to mount a small disk here")
+    try:
+        yield
+    finally:
+        subprocess.run(["umount", "-l", folder], check=True)
+
+
+def fill(path: Path) -> None:
+    """Take all the room that a disk has."""
+    with open(path, "wb", buffering=0) as file:
+        try:
+            while True:
+                file.write(bytes(4096))
+        except OSError:
+            pass
+
+
+STAGES = [
+    "results/scenes/uniform-0000.h5",
+    "results/stokes/uniform-0000.h5",
+    "results/dataset/forces.h5",
+    "results/sweep/streamwise/10-10.json",
+    "results/model/anchored.safetensors",
+    "results/sedimentation/n100_phi1e-03_ga1_rotne_prager_long.nc",
+    "results/analysis/steady_state.csv",
+    "results/figures/inverse_beta.png",
+]
+
+
+def stopped(done: subprocess.CompletedProcess, cause: str) -> str:
+    words = done.stdout + done.stderr
+    last = words.rstrip().splitlines()[-1]
+    told = done.returncode != 0 and last.startswith("Stopped: ") and cause in last
+    return "detected" if told else f"crashed ({last})"
+
+
+@pytest.mark.parametrize("file", STAGES)
+def test_a_full_disk_is_told_at_every_stage_and_the_run_goes_on(whole, tmp_path, ledger, file):
+    if not (whole.folder / file).exists():
+        pytest.skip("this campaign does not make it")
+    arguments = (*SMOKE, "--rerun-triggers", "mtime", "--", file)
+    with small_disk(tmp_path / "results"):
+        project = copy_of(whole, tmp_path)
+        (project.folder / file).unlink()
+        fill(tmp_path / "results/ballast")
+        outcome = stopped(project.snakemake(*arguments), "the disk is full")
+        (tmp_path / "results/ballast").unlink()
+        project.run(*arguments)
+        healed = "silent" if difference(project, whole) else "healed"
+    count(ledger, "a full disk, at a stage", [outcome])
+    count(ledger, "the same command after a full disk", [healed])
+
+
+def test_a_folder_that_cannot_be_written_is_told(whole, tmp_path, ledger):
+    with small_disk(tmp_path / "results"):
+        project = copy_of(whole, tmp_path)
+        (project.folder / STAGES[1]).unlink()
+        subprocess.run(["mount", "-o", "remount,ro", tmp_path / "results"], check=True)
+        arguments = (*SMOKE, "--rerun-triggers", "mtime", "--", STAGES[1])
+        outcome = stopped(project.snakemake(*arguments), "the file system is read-only")
+    count(ledger, "a folder of results that cannot be written", [outcome])
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_campaign_half_deleted_is_made_whole(whole, tmp_path, ledger, seed):
+    project = copy_of(whole, tmp_path)
+    rng = np.random.default_rng(seed)
+    files = sorted(path for path in (tmp_path / "results").rglob("*") if path.is_file())
+    for path in files:
+        if rng.random() < 0.5:
+            path.unlink()
+    # A checksum without its file and a file without its checksum: the one is made anew with its
+    # file, the other is refused by name until it is removed, as the sentence says.
+    for _ in files:
+        done = project.snakemake(*SMOKE, "--", *TARGET)
+        last = (done.stdout + done.stderr).rstrip().splitlines()[-1]
+        if done.returncode == 0:
+            break
+        assert "has no checksum" in last, last
+        for name in {part.split("'")[0] for part in last.split("(rm '")[1:]}:
+            (project.folder / name).unlink()
+    count(
+        ledger, "half of the files deleted", ["silent" if difference(project, whole) else "healed"]
+    )
+
+
+def test_of_two_runs_at_once_one_is_refused_and_the_other_ends(whole, tmp_path, ledger, start_up):
+    project = Project(tmp_path)
+    first = begin(project, "--", *TARGET)
+    while not (tmp_path / ".snakemake/locks").exists():
+        time.sleep(0.1)
+    time.sleep(start_up)
+    done = project.snakemake(*SMOKE, "--", *TARGET)
+    refused = done.returncode != 0 and "snakemake --unlock" in done.stdout + done.stderr
+    assert first.wait() == 0
+    count(ledger, "a second run at once", ["detected" if refused else "silent"])
+    assert not difference(project, whole)
