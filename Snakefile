@@ -1,7 +1,8 @@
 # The campaign: random scenes, their forces, force models, sedimentation, figures.
 # `snakemake -n` shows the plan, `snakemake all` runs it, `snakemake figures` makes the figures,
 # `snakemake exports` writes trajectories for ParaView, `snakemake benchmarks` times the solver,
-# `snakemake studies` compares time steps, `snakemake validation` writes the numbers of the docs.
+# `snakemake studies` compares time steps, `snakemake openfoam` settles a cloud in OpenFOAM too,
+# `snakemake validation` writes the numbers of the docs.
 import json
 import os
 import sys
@@ -66,6 +67,7 @@ include: "workflow/rules/figures.smk"
 include: "workflow/rules/tables.smk"
 include: "workflow/rules/benchmarks.smk"
 include: "workflow/rules/studies.smk"
+include: "workflow/rules/openfoam.smk"
 
 
 rule all:
@@ -113,6 +115,12 @@ rule studies:
     input:
         "results/studies/step_size.csv",
         "results/studies/neighbour_numbers.csv",
+
+
+rule openfoam:
+    """OpenFOAM beside this package; no part of `all`, as it needs what `make openfoam` builds."""
+    input:
+        "results/figures/openfoam_settling.png",
 
 
 rule configuration:

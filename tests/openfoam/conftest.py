@@ -13,6 +13,7 @@ from dustfall.forces import load_model
 from dustfall.sedimentation import Properties, start_from
 from dustfall.sedimentation.closures.nearest_neighbours import drag_coefficients
 from openfoam.cases.make_settling import PLUGIN, make_case
+from openfoam.cases.read_settling import read_frames
 
 SOLVER = "icoUncoupledKinematicParcelFoam"
 
@@ -87,35 +88,8 @@ class Case:
         side, start = self.start.box_length, self.start.position
         wrapped = start - side * np.floor(start / side)
         frames = [(wrapped, self.start.velocity, np.zeros(len(wrapped)))]
-        folders = sorted(self.folder.glob("processor*")) or [self.folder]
-        times = {path.name for path in folders[0].iterdir() if re.match(r"\d", path.name)}
-        for time in sorted(times - {"0"}, key=float):
-            parts = []
-            for rank, folder in enumerate(folders):
-                parcels = folder / time / "lagrangian" / "kinematicCloud"
-                number = _numbers(parcels / "origId", 1)
-                columns = (
-                    _numbers(parcels / "positions", 4)[:, :3] / PROPERTIES.diameter,
-                    _numbers(parcels / "U", 3) / PROPERTIES.settling_velocity,
-                    np.full(len(number), rank),
-                )
-                parts.append(np.column_stack([number, *columns]))
-            table = np.concatenate(parts)
-            table = table[table[:, 0].argsort()]
-            frames.append((table[:, 1:4], table[:, 4:7], table[:, 7]))
+        frames += [frame[1:] for frame in read_frames(self.folder, PROPERTIES)]
         return tuple(zip(*frames, strict=True))
-
-
-def _numbers(path, columns):
-    """The list in a file of OpenFOAM, (n, columns)."""
-    body = path.read_text().split("}", 1)[1]
-    body = re.sub(r"//.*", "", body)
-    uniform = re.match(r"\s*(\d+)\{(.*)\}", body)
-    if uniform:
-        value = [float(number) for number in uniform[2].strip("()").split()]
-        return np.tile(value, (int(uniform[1]), 1))
-    values = re.sub(r"[()]", " ", body.split("(", 1)[1]).split() if "(" in body else []
-    return np.array(values, dtype=float).reshape(-1, columns)
 
 
 @pytest.fixture(name="make_case")

@@ -60,6 +60,7 @@ TITLES = {
     "phase_and_spectra": ("Fluctuations", "Phase diagrams and spectra"),
     "cloud_spectra": ("Fluctuations", "Spectra of all particles"),
     "ergodicity": ("Fluctuations", "Time and ensemble averages"),
+    "openfoam_settling": ("In time", "OpenFOAM and dustfall"),
     "voronoi_pdf": ("Clustering", "Densities of Voronoi volumes"),
     "voronoi_variance": ("Clustering", "Variance of Voronoi volumes"),
 }
