@@ -11,6 +11,7 @@ from workflow.readers import read_by, readers
 SMOKE = ("--configfile", "config/smoke.yaml")
 READERS = readers()
 CHOSEN_FROM = {
+    "idnn.laws_of.anchored",
     "idnn.layers_of.dense",
     "scenes.number.uniform",
     "sedimentation.galileo.multiples",
