@@ -71,7 +71,7 @@ class Run:
     waiting: Counter = field(default_factory=Counter)
     running: dict[int, Job] = field(default_factory=dict)
     took: dict[str, list[float]] = field(default_factory=dict)
-    failed: int = 0
+    failed: set[int] = field(default_factory=set)
     done: int = 0
 
     @property
@@ -83,6 +83,7 @@ class Run:
         """Note that a job has begun."""
         self.waiting[job.rule] -= 1
         self.running[number] = job
+        self.failed.discard(number)
 
     def finish(self, number: int, now: float) -> None:
         """Note that a job is done."""
@@ -96,7 +97,7 @@ class Run:
         job = self.running.pop(number, None)
         if job:
             self.waiting[job.rule] += 1
-            self.failed += 1
+            self.failed.add(number)
 
     def seconds_to_go(self, now: float) -> float | None:
         """Seconds until the last job is done, as if jobs went on as many at a time as now."""
@@ -181,7 +182,7 @@ class Terminal(logging.Handler):
         if seconds is not None:
             line += f", about {duration(seconds)} to go"
         if run.failed:
-            line += f", {run.failed} failed"
+            line += f", {len(run.failed)} failed"
         shown = [self._named(job) for job in list(run.running.values())[:4]]
         more = len(run.running) - len(shown)
         return (

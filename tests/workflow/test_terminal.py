@@ -73,10 +73,10 @@ def test_the_time_to_go_of_equal_jobs_is_what_they_take(cores):
 def test_a_job_that_is_tried_again_counts_once():
     run = run_of(seconds=1.0, jobs=4, cores=1)
     run.fail(1)
-    assert (run.total, run.waiting["settle"]) == (4, 3)
+    assert (run.total, run.waiting["settle"], len(run.failed)) == (4, 3, 1)
     run.start(1, Job("settle", "settle 1", [], since=2.0))
     run.finish(1, now=3.0)
-    assert (run.total, run.done) == (4, 2)
+    assert (run.total, run.done, len(run.failed)) == (4, 2, 0)
 
 
 @pytest.mark.parametrize(
