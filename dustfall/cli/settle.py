@@ -9,8 +9,8 @@ SUMMARY = "let particles settle in a periodic cube of fluid at rest"
 
 DESCRIPTION = """\
 A run that was killed goes on where it was when the same command is called again, and ends with
-the same bits; Ctrl-C and SIGTERM lose at most one checkpoint interval. Besides the trajectory
-run.nc there is run.series.nc, with means over the particles at every step.
+the same bits; Ctrl-C and SIGTERM save the state and stop. Besides the trajectory run.nc there is
+run.series.nc, with means over the particles at every step.
 Starts: a trajectory .nc, or a table x, y, z [d_p], velocity_x, velocity_y, velocity_z [v_s] (the
 velocities may be left out); v_s is the settling velocity of an isolated particle, z upwards."""
 

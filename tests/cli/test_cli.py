@@ -13,6 +13,7 @@ import xarray as xr
 
 from dustfall.cli import SUBCOMMANDS, main, parser
 from dustfall.forces import FORMULAS, load_model
+from dustfall.sedimentation.checkpoint import CURRENT
 from dustfall.stokes import fixed_spheres
 from tests.forces.scenes import random_neighbours
 
@@ -80,7 +81,7 @@ def test_a_run_that_is_killed_goes_on_to_the_same_bits_by_the_same_command(tmp_p
         (tmp_path / name).mkdir()
     assert run(f"{SETTLE} -o {{0}}/run.nc", tmp_path / "whole") == 0
     command = f"{SETTLE} -o {tmp_path / 'killed' / 'run.nc'} --checkpoint-interval 0"
-    state = tmp_path / "killed" / "run.checkpoint" / "state.npz"
+    state = tmp_path / "killed" / "run.checkpoint" / CURRENT
     process = subprocess.Popen([sys.executable, "-m", "dustfall", *shlex.split(command)])
     while not state.exists():
         assert process.poll() is None
@@ -104,7 +105,7 @@ def test_a_run_that_is_whole_is_not_begun_anew(tmp_path, capsys):
 
 
 def test_a_run_starts_from_a_table_or_from_where_another_ended(tmp_path):
-    position = 10.0 * np.random.default_rng(1).permutation(np.eye(12, 3) + np.arange(12)[:, None])
+    position = 10.0 * np.argwhere(np.ones((3, 2, 2))) + np.random.default_rng(1).random((12, 3))
     names = "x [d_p],y [d_p],z [d_p]"
     np.savetxt(tmp_path / "start.csv", position, "%.17g", ",", header=names, comments="")
     options = "--phi 1e-4 --model isolated --duration 1 --precision float64 --save-every 0.5"
