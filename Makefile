@@ -13,7 +13,7 @@ GMSH_LIBRARIES := libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 libgomp1
 CAN_INSTALL := [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null
 APT_INSTALL := apt-get update && apt-get install -y --no-install-recommends
 
-.PHONY: run shell test slurm-test fault-test openfoam openfoam-test tools-test environment lock \
+.PHONY: run shell test docs slurm-test fault-test openfoam openfoam-test tools-test environment lock \
 	gmsh-libraries clean-environment
 
 run: environment
@@ -39,6 +39,9 @@ slurm-test: environment
 # into the table of docs/faults.md.
 fault-test: environment
 	FAULT_TABLE=docs/faults.csv $(VENV)/bin/python -m pytest tests/faults -m faults
+
+docs: environment
+	NO_MKDOCS_2_WARNING=1 $(VENV)/bin/python -m mkdocs build
 
 openfoam:
 	openfoam/build.sh

@@ -9,6 +9,7 @@ from dustfall.forces.formula import Formula
 from dustfall.forces.formulas import FORMULAS
 
 FORCE_MODELS: dict[str, Formula | Kind] = {**FORMULAS, **KINDS}
+"""Every force model, by its name: closed formulas, and kinds that have to be trained."""
 
 
 def title(name: str) -> str:

@@ -10,3 +10,4 @@ from dustfall.forces.formula import Formula, load_formula
 FORMULAS: dict[str, Formula] = {
     module.name: load_formula(module.name) for module in iter_modules(__path__)
 }
+"""Every closed formula, by its name."""
