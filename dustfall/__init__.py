@@ -5,6 +5,6 @@ Lengths are in particle diameters d_p and forces in Re_p c_D unless a docstring 
 
 from dustfall.kernels import find_cache_folder
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 find_cache_folder()
