@@ -27,8 +27,9 @@ class Solution:
     """Forces on n fixed spheres and what is known of their quality.
 
     force: (n, 3) [Re_p c_D]. error_estimate: (n,), of each sphere's force over that on an isolated
-    sphere, 24. iterations, residual: of the linear system, the latter relative. minimum_gap:
-    smallest distance of two surfaces [d_p], inf for one sphere. status: how it ended.
+    sphere of its size, 24 for the diameter d_p. iterations, residual: of the linear system, the
+    latter relative. minimum_gap: smallest distance of two surfaces [d_p], inf for one sphere.
+    status: how it ended.
     """
 
     force: np.ndarray
@@ -45,9 +46,9 @@ class Resistance:
 
     force: (n, 3) [3 pi mu d_p U]. torque: (n, 3), stresslet: (n, 3, 3), symmetric, without trace
     [pi mu d_p^2 U]. error_estimate: (n,), the largest error of |force| / d, |torque| / d^2 and
-    |stresslet| / d^2, d the sphere's diameter, over the larger of what these themselves are and of
-    the fastest motion of any sphere against the undisturbed flow, |velocity| + d |gradient|.
-    iterations, residual: of the linear system, the latter relative. minimum_gap: smallest distance
+    |stresslet| / d^2, d the sphere's diameter, over `scale`. scale: (n,) [U], the larger of what
+    these themselves are and of the fastest motion of any sphere against the undisturbed flow,
+    |velocity| + d |gradient|. iterations, residual: of the linear system, the latter relative. minimum_gap: smallest distance
     of two surfaces [d_p], inf for one sphere. status: how it ended.
     """
 
@@ -55,6 +56,7 @@ class Resistance:
     torque: np.ndarray
     stresslet: np.ndarray
     error_estimate: np.ndarray
+    scale: np.ndarray
     iterations: int
     residual: float
     minimum_gap: float
@@ -67,15 +69,16 @@ class Mobility:
 
     velocity: (n, 3) [U]. angular_velocity: (n, 3) [U / d_p]. stresslet: (n, 3, 3), by the fluid
     [pi mu d_p^2 U]. error_estimate: (n,), the largest error of |velocity|, d |angular_velocity|
-    and |stresslet| / d^2, over the larger of what these are against the undisturbed flow and of
-    the largest |force| / d, |torque| / d^2 and d |gradient| of any sphere. Others as in
-    `Resistance`.
+    and |stresslet| / d^2, over `scale`. scale: (n,) [U], the larger of what these are against the
+    undisturbed flow and of the largest |force| / d, |torque| / d^2 and d |gradient| of any sphere.
+    Others as in `Resistance`.
     """
 
     velocity: np.ndarray
     angular_velocity: np.ndarray
     stresslet: np.ndarray
     error_estimate: np.ndarray
+    scale: np.ndarray
     iterations: int
     residual: float
     minimum_gap: float

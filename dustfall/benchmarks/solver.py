@@ -136,7 +136,7 @@ def time_against_spheres(
     """
     rows = []
     for n in numbers:
-        centres = _random_cloud(n, 0.01, stream(Purpose.BENCHMARK, seed, n))
+        centres = random_cloud(n, 0.01, stream(Purpose.BENCHMARK, seed, n))
         seconds = []
         for _ in range(repeats + 1):
             start = time.perf_counter()
@@ -178,7 +178,7 @@ def _plain(forces):
     return lambda centres: (forces(centres), None)
 
 
-def _random_cloud(n: int, phi: float, stream) -> np.ndarray:
+def random_cloud(n: int, phi: float, stream) -> np.ndarray:
     """n centres (n, 3) [d_p] drawn one after the other in a cube, without overlap."""
     edge = (n * np.pi / 6.0 / phi) ** (1.0 / 3.0)
     centres = np.empty((0, 3))

@@ -1,9 +1,8 @@
 """Forces on spheres in Stokes flow, fixed or moving, and velocities under given forces."""
 
 from dustfall.solution import Mobility, Resistance, Solution, Status
-from dustfall.stokes.methods import fixed_spheres
+from dustfall.stokes.methods import fixed_spheres, forces_on_fixed_spheres
 from dustfall.stokes.moving import mobility, resistance
-from dustfall.stokes.solve import forces_on_fixed_spheres
 
 __all__ = [
     "Mobility",

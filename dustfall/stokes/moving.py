@@ -28,19 +28,43 @@ from dustfall.spheres import (
 from dustfall.stokes.close_pairs import effective_coupling
 from dustfall.stokes.harmonics import exact_response
 from dustfall.stokes.moving_plan import MovingPlan, most_amplified, plan_moving
-from dustfall.stokes.multipoles import add_responses, couple_scene, incoming_flow, solve_system
+from dustfall.stokes.multipoles import (
+    AXES,
+    add_responses,
+    couple_scene,
+    incoming_flow,
+    solve_system,
+)
 from dustfall.stokes.plan import LARGEST_TOLERANCE, SMALLEST_TOLERANCE
 from dustfall.stokes.solve import MOST_ITERATIONS, RESIDUAL_SHARE, response_rows
 from dustfall.stokes.translation import MOST_DEGREE, block_sizes, translation_tables
 
-LEVELS = ((1.0, 30), (0.1, MOST_DEGREE), (1e-2, MOST_DEGREE), (1e-3, MOST_DEGREE))
-"""Of degrees: tolerance over that of the solution, and largest degree of a pair for others."""
+
+@dataclass(frozen=True)
+class _Level:
+    """Of degrees: tolerance over that of the solution, least of a close pair, most of any pair."""
+
+    share: float
+    least: int
+    most: int
+
+
+LEVELS = (
+    _Level(1.0, 3, 30),
+    _Level(0.3, 4, MOST_DEGREE),
+    _Level(0.05, 5, MOST_DEGREE),
+    _Level(0.005, 6, MOST_DEGREE),
+)
+"""Each has more degrees than the one before; the first two are always solved."""
+
+SAFETY = 2.0
+"""Of the error estimate over the change between levels (`benchmarks.moving` samples it)."""
+
+FIRST_GOAL = 10.0
+"""Residual of the first level, over that of the others."""
 
 ROUNDING = 1e-14
 """Relative residual that no iteration gets below."""
-
-AXES = (1, 2, 0)
-"""Coordinate of each harmonic of degree 1."""
 
 CROSS = np.array([[np.cross(a, b) for b in np.eye(3)] for a in np.eye(3)]).transpose(2, 0, 1)
 """Levi-Civita's symbol: (a x b)_i = CROSS_ijk a_j b_k."""
@@ -196,7 +220,7 @@ def _answers(field, coupled, response) -> np.ndarray:
 
 def _harmonics(scene, coupled, speeds, gradients) -> np.ndarray:
     """Harmonics (total, 3) of flows on the spheres, with velocities and gradients at the centres"""
-    starts = coupled[3]
+    starts = coupled[4]
     out = np.zeros((starts[-1], 3))
     out[starts[:-1]] = OF_ONE * speeds
     for k, axis in enumerate(AXES):
@@ -206,7 +230,7 @@ def _harmonics(scene, coupled, speeds, gradients) -> np.ndarray:
 
 def _moments(scene, coupled, force, torque) -> np.ndarray:
     """Moments (total, 3) of the tractions least in degree that have a force and a torque."""
-    starts, radii = coupled[3], scene.radii[:, None]
+    starts, radii = coupled[4], scene.radii[:, None]
     out = np.zeros((starts[-1], 3))
     out[starts[:-1]] = 3.0 * np.pi / OF_ONE * force / radii
     turning = 0.5 * np.pi / OF_COORDINATE * np.einsum("kji,nk->nij", CROSS, torque)
@@ -217,7 +241,7 @@ def _moments(scene, coupled, force, torque) -> np.ndarray:
 
 def _loads(scene, coupled, moments) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Force (n, 3), torque (n, 3) and stresslet (n, 3, 3) of tractions, in a user's units."""
-    starts, radii = coupled[3], scene.radii[:, None]
+    starts, radii = coupled[4], scene.radii[:, None]
     force = OF_ONE / (3.0 * np.pi) * radii * moments[starts[:-1]]
     first = np.empty((len(force), 3, 3))
     for k, axis in enumerate(AXES):
@@ -233,7 +257,7 @@ def _rigid_motion(scene, coupled, slip, moments) -> tuple[np.ndarray, np.ndarray
 
     slip: (total, 3), the flow on each sphere but for that of its own traction.
     """
-    starts, answer = coupled[3], exact_response(1)
+    starts, answer = coupled[4], exact_response(1)
     velocity = slip[starts[:-1]] - moments[starts[:-1]] / answer[0, 2]
     gradients = np.empty((len(velocity), 3, 3))
     for k, axis in enumerate(AXES):
@@ -249,26 +273,27 @@ def _solved(scene, amplified, response, right, measured, units, scale) -> tuple:
     amplified: as in `plan_moving`. right, measured: functions of the coupled scene, and of its
     moments too, the right-hand side and what is asked for: two (n, 3) and one (n, 3, 3). units:
     (n,) of each of the three, that makes them velocities. scale: the velocity that errors are over.
-    Returns the three, error estimate, iterations, residual, smallest gap and status.
+    Returns the three, error estimate and what it is over, iterations, residual, smallest gap and
+    status.
     """
     radii, n = scene.radii, len(scene.radii)
     gap = float(np.min(scene.distance - radii[:, None] - radii))
     if scale == 0.0:
-        nothing = np.zeros((n, 3))
-        return (
-            nothing, nothing, np.zeros((n, 3, 3)), np.zeros(n), 0, 0.0, gap, Status.CONVERGED
-        )  # fmt: skip
+        still = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3, 3))
+        return *still, np.zeros(n), np.zeros(n), 0, 0.0, gap, Status.CONVERGED
     condition = most_amplified(scene.distance, radii) if amplified else 1.0
     goal = max(RESIDUAL_SHARE * scene.tolerance / condition, ROUNDING)
     before = coarser = None
     iterations = 0
-    for share, most in LEVELS:
-        plan = plan_moving(scene.distance, radii, share * scene.tolerance, amplified, most)
-        check_memory(plan)
+    for level in LEVELS:
+        plan = _planned(scene, amplified, level)
+        _check_memory(plan)
         coupled = _coupled(scene, plan)
-        moments, taken, residual = _iterated(right(coupled), before, coupled, response, goal)
+        # The first is there to be compared with.
+        enough = goal if coarser is not None else FIRST_GOAL * goal
+        moments, taken, residual = _iterated(right(coupled), before, coupled, response, enough)
         iterations += taken
-        before = moments, coupled[3]
+        before = moments, coupled[4]
         finer = measured(coupled, moments)
         sizes = [_size(value) / unit for value, unit in zip(finer, units, strict=True)]
         own = np.maximum(np.max(sizes, axis=0), scale)
@@ -278,7 +303,8 @@ def _solved(scene, amplified, response, right, measured, units, scale) -> tuple:
                 for fine, coarse, unit in zip(finer, coarser, units, strict=True)
             ]
             unsolved = np.sqrt(n) * residual * condition
-            estimate = np.max(change, axis=0) / own + (plan.left_out + unsolved) * scale / own
+            estimate = SAFETY * np.max(change, axis=0) + (plan.left_out + unsolved) * scale
+            estimate /= own
             if residual > goal or estimate.max() <= scene.tolerance:
                 break
             if plan.degrees.max() == MOST_DEGREE:
@@ -288,7 +314,12 @@ def _solved(scene, amplified, response, right, measured, units, scale) -> tuple:
         status = Status.NOT_CONVERGED
     else:
         status = Status.CONVERGED if estimate.max() <= scene.tolerance else Status.OUT_OF_REACH
-    return *finer, estimate, iterations, float(residual), gap, status
+    return *finer, estimate, own, iterations, float(residual), gap, status
+
+
+def _planned(scene, amplified, level) -> MovingPlan:
+    share = level.share * scene.tolerance
+    return plan_moving(scene.distance, scene.radii, share, amplified, level.least, level.most)
 
 
 def _coupled(scene, plan: MovingPlan):
@@ -314,28 +345,38 @@ def _iterated(right, before, coupled, response, goal):
     guess = np.zeros_like(right)
     if before is not None:
         old, old_starts = before
-        for i, start in enumerate(coupled[3][:-1]):
-            count = min(np.diff(old_starts)[i], np.diff(coupled[3])[i])
+        for i, start in enumerate(coupled[4][:-1]):
+            count = min(np.diff(old_starts)[i], np.diff(coupled[4])[i])
             guess[start : start + count] = old[old_starts[i] : old_starts[i] + count]
     return solve_system(
         right, guess, coupled, response, translation_tables(), goal, MOST_ITERATIONS
     )
 
 
-def memory(plan: MovingPlan) -> int:
+def needed_memory(centres, radii=None, tolerance: float = 1e-4, moves: bool = False) -> int:
+    """Bytes that `mobility`, or `resistance` where the spheres' `moves` are given, takes, about.
+
+    Twenty times n^2, and not in this number, is taken to find it. Raises ValueError as they do.
+    """
+    scene = _checked_scene(centres, radii, tolerance)
+    return _memory(_planned(scene, moves, LEVELS[1]))
+
+
+def _memory(plan: MovingPlan) -> int:
     """Bytes, at most, that the solution of a planned scene takes."""
     degrees = plan.degrees[np.tril_indices(len(plan.degrees), -1)]
     close = plan.close[np.tril_indices(len(plan.degrees), -1)]
     entries = np.array([block_sizes(degree)[1] for degree in range(MOST_DEGREE + 1)])
     # Couplings of close pairs are made one after the other, and copied.
-    couplings = np.sum(entries[degrees] * np.where(close, 8, 1) + 4 * (degrees + 2))
+    couplings = entries[degrees] * np.where(close, 8, 1) + 4 * (degrees + 2)
+    couplings = np.sum(np.where((degrees == 1) & ~close, 0, couplings))
     moments = 3 * np.sum((np.maximum(plan.degrees.max(axis=1), 1) + 1) ** 2)
     return 8 * int(couplings + moments * (MOST_ITERATIONS + 20) + 8 * plan.degrees.size)
 
 
-def check_memory(plan: MovingPlan) -> None:
-    """Raise MemoryError, with both sizes, where `memory` is more than there is."""
-    needed, there = memory(plan), available_memory()
+def _check_memory(plan: MovingPlan) -> None:
+    """Raise MemoryError, with both sizes, where `_memory` is more than there is."""
+    needed, there = _memory(plan), available_memory()
     if needed > there:
         raise MemoryError(
             f"{len(plan.degrees)} spheres take {needed / 2**30:.1f} GiB at this tolerance: only "

@@ -12,9 +12,6 @@ from numba import njit
 CLOSE = 0.62
 """Slope xi below which the high degrees of a pair are eliminated: a gap of 0.2 d_p."""
 
-LEAST_CLOSE = 3
-"""Degree that a close pair has for others, at least."""
-
 LONE_DIGITS = 6.0
 """Degrees of a close pair, over its slope, beyond those that e^-(2 degree xi) asks for.
 
@@ -40,15 +37,18 @@ class MovingPlan:
     left_out: np.ndarray
 
 
-def plan_moving(distance, radii, tolerance: float, amplified: bool, most: int) -> MovingPlan:
+def plan_moving(
+    distance, radii, tolerance: float, amplified: bool, least: int, most: int
+) -> MovingPlan:
     """Choose the degrees that every pair exchanges.
 
     distance: (n, n), inf on the diagonal; radii: (n,), in one unit. tolerance: of what the degrees
     left out do to a sphere, relative to its own motion. amplified: whether velocities are given, so
-    that lubrication makes large forces of small errors. most: largest degree of a pair for others.
+    that lubrication makes large forces of small errors. least, most: degree of a close pair, and of
+    any, for others.
     """
     xi = slopes(distance, radii)
-    degrees, close, left_out = _choose(distance, xi, radii, tolerance, amplified, most)
+    degrees, close, left_out = _choose(distance, xi, radii, tolerance, amplified, least, most)
     digits = 0.5 * np.log(1.0 / tolerance) + LONE_DIGITS
     wanted = np.ceil(digits / np.maximum(xi, digits / MOST_ELIMINATED))
     eliminated = np.where(close, np.maximum(wanted, degrees + 1), 0).astype(int)
@@ -77,7 +77,7 @@ def most_amplified(distance, radii) -> float:
 
 
 @njit(cache=True)
-def _choose(distance, xi, radii, tolerance, amplified, most):
+def _choose(distance, xi, radii, tolerance, amplified, least, most):
     """Degrees (n, n), closeness (n, n), and the root of the squares (n,) of what is left out."""
     n = len(radii)
     degrees = np.zeros((n, n), dtype=np.int64)
@@ -95,7 +95,7 @@ def _choose(distance, xi, radii, tolerance, amplified, most):
         complete = True
         for i in range(n):
             for j in range(i):
-                degree = LEAST_CLOSE if close[i, j] else 0
+                degree = least if close[i, j] else 0
                 degree = min(max(degree, degrees[i, j]), most)
                 while True:
                     at_i, at_j = _left_out(

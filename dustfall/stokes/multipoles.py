@@ -25,6 +25,9 @@ from dustfall.stokes.translation import (
     turns_to,
 )
 
+AXES = (1, 2, 0)
+"""Coordinate of each harmonic of degree 1."""
+
 
 @njit(cache=True)
 def _add_forces(coupling, begin, moments, i, j, incoming):
@@ -34,6 +37,60 @@ def _add_forces(coupling, begin, moments, i, j, incoming):
             v = coupling[begin + 3 * a + b]
             incoming[i, a] += v * moments[j, b]
             incoming[j, a] += v * moments[i, b]
+
+
+@njit(cache=True)
+def _add_first_moments(x, y, z, squares, q, u):
+    """Add to u (4, 3) the harmonics of degrees 0 and 1 that moments q (4, 3) make, at x, y, z.
+
+    squares: of the radii there, and of the moments' sphere. Exact, as the coupling of degree 1 is:
+    a Stokeslet G and its gradient with the Faxen parts of both spheres, c laplacian G, where c is
+    a^2 / 6 for degree 0 and a^2 / 10 for degree 1 (Kim and Karrila 1991, chapter 2).
+    """
+    here, there = squares
+    inverse = 1.0 / (x * x + y * y + z * z)
+    # 4 pi by the harmonics of 1, over 8 pi; a coordinate's are a root of 3 smaller.
+    scale = 0.5 * np.sqrt(inverse)
+    a, b = np.sqrt(here / 3.0), np.sqrt(there / 3.0)
+    r, force = (x, y, z), (q[0, 0], q[0, 1], q[0, 2])
+    by_force = x * force[0] + y * force[1] + z * force[2]
+    # First moments: component of the traction, coordinate.
+    xx, xy, xz = b * q[3, 0], b * q[1, 0], b * q[2, 0]
+    yx, yy, yz = b * q[3, 1], b * q[1, 1], b * q[2, 1]
+    zx, zy, zz = b * q[3, 2], b * q[1, 2], b * q[2, 2]
+    d = ((xx, xy, xz), (yx, yy, yz), (zx, zy, zz))
+    trace = xx + yy + zz
+    out = (xx * x + xy * y + xz * z, yx * x + yy * y + yz * z, zx * x + zy * y + zz * z)
+    back = (xx * x + yx * y + zx * z, xy * x + yy * y + zy * z, xz * x + yz * y + zz * z)
+    twice = x * out[0] + y * out[1] + z * out[2]
+
+    c = (here + there) / 6.0 * inverse
+    alpha, beta = 1.0 + 2.0 * c, (1.0 - 6.0 * c) * inverse
+    e = (here / 6.0 + there / 10.0) * inverse
+    alpha_1, beta_1 = -(1.0 + 6.0 * e) * inverse, -(3.0 - 30.0 * e) * inverse**2
+    beta_0 = (1.0 - 6.0 * e) * inverse
+    along = beta * by_force - beta_1 * twice - beta_0 * trace
+    for i in range(3):
+        u[0, i] += scale * (alpha * force[i] - alpha_1 * out[i] - beta_0 * back[i] + along * r[i])
+    e = (here / 10.0 + there / 6.0) * inverse
+    alpha_1, beta_1 = -(1.0 + 6.0 * e) * inverse, -(3.0 - 30.0 * e) * inverse**2
+    beta_0 = (1.0 - 6.0 * e) * inverse
+    c = (here + there) / 10.0 * inverse
+    beta, gamma_1 = (1.0 - 6.0 * c) * inverse, -(1.0 + 6.0 * c) * inverse
+    delta_1 = -(3.0 - 30.0 * c) * inverse**2
+    gamma_2 = (3.0 + 30.0 * c) * inverse**2
+    delta_2 = (15.0 - 210.0 * c) * inverse**3
+    both = beta_1 * by_force - delta_2 * twice - delta_1 * trace
+    isotropic = beta_0 * by_force - delta_1 * twice - beta * trace
+    for k in range(3):
+        m = AXES[k]
+        for i in range(3):
+            value = r[m] * (alpha_1 * force[i] - gamma_2 * out[i] - delta_1 * back[i] + both * r[i])
+            value += r[i] * (beta_0 * force[m] - delta_1 * (out[m] + back[m]))
+            value -= gamma_1 * d[i][m] + beta * d[m][i]
+            if m == i:
+                value += isotropic
+            u[1 + k, i] += scale * a * value
 
 
 @njit(cache=True)
@@ -122,9 +179,10 @@ def couple_scene(centres, radii, degrees, least, close_pairs, tables):
     centres: (n, 3), radii: (n,), in one unit. degrees: (n, n) symmetric, of each pair. least:
     degree that every sphere has at least. close_pairs: (n, n), which pairs j < i are close, or
     (0, 0) where none is; and their effective couplings, row by row one after the other.
-    Returns radii, degrees, the highest degree (n,) and the first harmonic (n + 1,) of the spheres;
-    for all pairs j < i, row by row, one after the other, whether they are close, `turns_to` their
-    directions and their couplings, and where those of each pair begin.
+    Returns centres, radii, degrees, the highest degree (n,) and the first harmonic (n + 1,) of the
+    spheres; for all pairs j < i, row by row, one after the other, whether they are close,
+    `turns_to` their directions and their couplings, and where those of each pair begin. A pair of
+    degree 1 that is not close has none of these: its few moments cost less than they do.
     """
     n = len(centres)
     highest = np.full(n, least)
@@ -142,8 +200,11 @@ def couple_scene(centres, radii, degrees, least, close_pairs, tables):
         for j in range(i):
             degree = degrees[i, j]
             close[p] = len(which) > 0 and which[i, j]
-            entries = (4 if close[p] else 1) * block_sizes(degree)[1] if degree > 0 else 9
-            begin[p + 1, 0] = begin[p, 0] + (4 * (degree + 2) if degree > 0 else 0)
+            turned = degree > 1 or close[p]
+            entries = 9 if degree == 0 else 0
+            if turned:
+                entries = (4 if close[p] else 1) * block_sizes(degree)[1]
+            begin[p + 1, 0] = begin[p, 0] + (4 * (degree + 2) if turned else 0)
             begin[p + 1, 1] = begin[p, 1] + entries
             p += 1
     turns, couplings, p, taken = np.empty(begin[count, 0]), np.empty(begin[count, 1]), 0, 0
@@ -153,7 +214,7 @@ def couple_scene(centres, radii, degrees, least, close_pairs, tables):
             coupling = couplings[begin[p, 1] : begin[p + 1, 1]]
             if degree == 0:
                 put_coupling_of_forces(centres[i], centres[j], both, coupling)
-            else:
+            elif len(coupling) > 0:
                 apart = centres[i] - centres[j]
                 distance = np.sqrt(np.sum(apart**2))
                 turns[begin[p, 0] : begin[p + 1, 0]] = turns_to(degree, apart / distance).ravel()
@@ -163,13 +224,13 @@ def couple_scene(centres, radii, degrees, least, close_pairs, tables):
                 else:
                     coupling[:] = axial_coupling(degree, distance, both, tables)
             p += 1
-    return radii, degrees, highest, starts, close, turns, couplings, begin
+    return centres, radii, degrees, highest, starts, close, turns, couplings, begin
 
 
 @njit(cache=True)
 def incoming_flow(moments, scene, tables):
     """sum_j K_ij a_j moments_j, (total, 3): what the others' tractions make on each sphere."""
-    radii, degrees, highest, starts, close, turns, couplings, begin = scene
+    centres, radii, degrees, highest, starts, close, turns, couplings, begin = scene
     largest = (np.max(highest) + 1) ** 2
     incoming, whole = np.zeros(moments.shape), np.empty(moments.shape)
     for i in range(len(highest)):
@@ -182,6 +243,17 @@ def incoming_flow(moments, scene, tables):
             degree = degrees[i, j]
             if degree == 0:
                 _add_forces(couplings, begin[p, 1], whole, starts[i], starts[j], incoming)
+            elif degree == 1 and not close[p]:
+                x, y, z = centres[i] - centres[j]
+                a, b = radii[i] ** 2, radii[j] ** 2
+                _add_first_moments(
+                    x, y, z, (a, b), whole[starts[j] : starts[j] + 4],
+                    incoming[starts[i] : starts[i] + 4],
+                )  # fmt: skip
+                _add_first_moments(
+                    -x, -y, -z, (b, a), whole[starts[i] : starts[i] + 4],
+                    incoming[starts[j] : starts[j] + 4],
+                )  # fmt: skip
             else:
                 own, other = (starts[i], starts[i + 1]), (starts[j], starts[j + 1])
                 _add_pair(
@@ -205,7 +277,7 @@ def incoming_flow(moments, scene, tables):
 @njit(cache=True)
 def add_responses(flow, scene, response, out):
     """out += T flow, sphere by sphere, for fields (total, 3) of a coupled scene."""
-    _, _, highest, starts, _, _, _, _ = scene
+    _, _, _, highest, starts, _, _, _, _ = scene
     for i in range(len(highest)):
         u, q = flow[starts[i] : starts[i + 1]], out[starts[i] : starts[i + 1]]
         _respond(highest[i], response, u, q)
@@ -256,7 +328,7 @@ def solve_scene(centres, flow, degrees, response, tables, tolerance, most):
     n = len(centres)
     none = (np.zeros((0, 0), dtype=np.bool_), np.zeros(0))
     scene = couple_scene(centres, np.ones(n), degrees, 0, none, tables)
-    starts = scene[3]
+    starts = scene[4]
     uniform, right = np.zeros((starts[n], 3)), np.zeros((starts[n], 3))
     for i in range(n):
         uniform[starts[i]] = np.sqrt(4.0 * np.pi) * flow

@@ -1,6 +1,5 @@
-"""Fixed spheres in a uniform Stokes flow: what a user calls, and the multipole solve behind it."""
+"""Fixed, equal spheres in a uniform Stokes flow, by multipoles: a planned scene, solved."""
 
-import warnings
 from functools import cache
 
 import numpy as np
@@ -9,7 +8,7 @@ from dustfall.solution import Solution, Status
 from dustfall.spheres import centre_distances, flow_direction
 from dustfall.stokes.harmonics import exact_response, response_matrix
 from dustfall.stokes.multipoles import solve_scene
-from dustfall.stokes.plan import Plan, error_bound, plan_scene
+from dustfall.stokes.plan import Plan, error_bound
 from dustfall.stokes.translation import MOST_DEGREE, translation_tables
 from dustfall.units import FORCE_UNIT, RADIUS, STOKES_DRAG
 
@@ -19,33 +18,8 @@ RESIDUAL_SHARE = 0.01
 """Of the tolerance, for the error that is left by the iteration."""
 
 
-def forces_on_fixed_spheres(centres, flow=(0.0, 1.0, 0.0), tolerance: float = 1e-4) -> np.ndarray:
-    """Force on each of n fixed, equal spheres in a uniform Stokes flow.
-
-    centres: (n, 3) in d_p. flow: (3,), velocity far away; forces are made dimensionless by its
-    magnitude. tolerance: of the force, relative to that on an isolated sphere, 1e-8 to 0.1.
-    Returns (n, 3) in Re_p c_D: an isolated sphere feels 24 along the flow; no flow, no force.
-    Raises ValueError if shapes are wrong, values are not finite, or spheres overlap, and
-    RuntimeError if GMRES does not converge. Warns where the estimated error exceeds the tolerance.
-    """
-    solution = solve(plan_scene(centres, tolerance), flow, tolerance)
-    if solution.status == Status.NOT_CONVERGED:
-        raise RuntimeError(
-            f"GMRES stopped at a residual of {solution.residual:.1e} after "
-            f"{solution.iterations} iterations; smallest gap {solution.minimum_gap:.1e} d_p"
-        )
-    if solution.status == Status.OUT_OF_REACH:
-        warnings.warn(
-            f"the estimated error, {solution.error_estimate.max():.1e}, exceeds the tolerance, "
-            f"{tolerance:.1e}: the smallest gap is {solution.minimum_gap:.1e} d_p",
-            RuntimeWarning,
-            stacklevel=2,
-        )
-    return solution.force
-
-
 def solve(plan: Plan, flow=(0.0, 1.0, 0.0), tolerance: float = 1e-4) -> Solution:
-    """Solve a planned scene; flow and tolerance as in `forces_on_fixed_spheres`."""
+    """Solve a planned scene; flow and tolerance as in `methods.fixed_spheres`."""
     flow = flow_direction(flow)
     distance = centre_distances(plan.centres)
     gap = float(distance.min() - 1.0)

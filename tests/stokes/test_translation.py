@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import lebedev_rule
 
 from dustfall.stokes.harmonics import real_harmonics
-from dustfall.stokes.multipoles import _add_pair
+from dustfall.stokes.multipoles import _add_first_moments, _add_pair
 from dustfall.stokes.translation import (
     axial_coupling,
     block_sizes,
@@ -138,3 +138,15 @@ def test_coupling_of_forces_is_that_of_degree_zero():
     tensor = tensor.reshape(3, 3)
     np.testing.assert_allclose(tensor @ forces[1, 0], u_i[0], rtol=1e-13)
     np.testing.assert_allclose(tensor @ forces[0, 0], u_j[0], rtol=1e-13)
+
+
+@pytest.mark.parametrize("radii", [(1.0, 1.0), (0.5, 1.3)])
+def test_coupling_of_first_moments_is_that_of_degree_one(radii):
+    shift = np.array([1.1, -1.7, 1.9])
+    moments = RNG.normal(size=(2, 4, 3))
+    expected = coupled(1, shift, *moments, radii)
+    found = np.zeros((2, 4, 3))
+    a, b = radii[0] ** 2, radii[1] ** 2
+    _add_first_moments(*shift, (a, b), moments[1], found[0])
+    _add_first_moments(*-shift, (b, a), moments[0], found[1])
+    np.testing.assert_allclose(found, expected, atol=1e-14)

@@ -5,6 +5,7 @@ import pytest
 from scipy.spatial.distance import cdist
 from scipy.spatial.transform import Rotation
 
+from dustfall.stokes import forces_on_fixed_spheres
 from dustfall.stokes.references import fundamental_solutions
 from dustfall.stokes.references.exact_pairs import forces_on_two_spheres
 from dustfall.stokes.references.fundamental_solutions import (
@@ -14,7 +15,6 @@ from dustfall.stokes.references.fundamental_solutions import (
     solve_with,
 )
 from dustfall.stokes.references.moving_pairs import loads_on_two_spheres
-from dustfall.stokes.solve import forces_on_fixed_spheres
 from tests.stokes.clusters import chain, six, triangle
 
 OBLIQUE = np.array([0.3, 0.9, -0.5])
