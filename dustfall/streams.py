@@ -31,7 +31,8 @@ class Purpose(IntEnum):
     TRUNCATION = 17  # kind of cluster, number
     EXPORT = 18
     BACK_FLOW = 19
-    MOVING = 20  # number of the cluster
+    MOVING = 20  # set, number
+    MOVING_SAMPLE = 21  # number of the cluster
 
 
 def stream(purpose: Purpose, seed: int, *items: int) -> np.random.Generator:

@@ -1,127 +1,112 @@
-"""Spheres that move: error estimates held against errors, and what a cloud of them costs.
+"""Run time against error for spheres that translate and turn, each in its own way."""
 
-`python -m dustfall.benchmarks.moving` prints both.
-"""
-
-import time
+from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
-import pandas as pd
+from scipy.spatial.distance import cdist
 
-from dustfall.benchmarks.solver import random_cloud
-from dustfall.stokes.moving import mobility, needed_memory, resistance
+from dustfall.benchmarks.solver import MULTIPOLE, Method
+from dustfall.benchmarks.stokesian_dynamics import stokesian_dynamics
+from dustfall.extras import extra
+from dustfall.stokes import resistance
+from dustfall.stokes.references.fundamental_solutions import reference_loads
+from dustfall.stokes.references.multiblob import moving_multiblob_forces
 from dustfall.streams import Purpose, stream
-from dustfall.units import RADIUS
 
-SMALLEST_GAP = 0.02
-"""Between spheres of a sampled cluster [d_p]."""
+with extra("benchmarks"):
+    from pygrpy.grpy_tensors import mu
 
-RADII = (0.15, 1.0)
-"""Range of the radii of every other cluster [d_p], log-uniform; the others' are equal."""
+EXACT = 1e-7
+"""Tolerance of the solve that errors are measured against."""
 
-FINE = 1e-7
-"""Tolerance of the solve that stands for the truth; its own estimate is added to each error."""
+SPHERES = 6
 
-OUTPUTS = {
-    resistance: {"force": 1, "torque": 2, "stresslet": 2},
-    mobility: {"velocity": 0, "angular_velocity": -1, "stresslet": 2},
-}
-"""What a problem is asked for, and the power of the diameter that makes it a velocity."""
+GAPS = {"moving, gaps from 0.2": (0.2, 2.0), "moving, gaps from 0.02": (0.02, 0.2)}
+"""Sets, and the gaps [d_p] between a sphere and that which it is put beside; no gap is narrower."""
 
 
-def sampled(number: int, tolerances=(1e-2, 1e-3, 1e-5), seed: int = 1, progress=None):
-    """Estimate and error of `number` random clusters of 2 to 20 spheres, one row for each sphere.
+def moving_sets(scenes: int, seed: int = 1) -> dict[str, list]:
+    """Random clusters of each set: (centres, velocity, angular velocity), (n, 3) each.
 
-    Columns problem, cluster, spheres, gap (smallest [d_p]), tolerance, error and estimate, both as
-    `error_estimate` is, and status.
+    Each sphere is put beside one that is there already, at a gap that is log-uniform between the
+    ends of the set; velocities and angular velocities are normal with variance 1.
     """
-    rows = []
-    for item in range(number):
-        rng = stream(Purpose.MOVING, seed, item)
-        centres, radii = _cluster(rng)
-        n, d = len(radii), 2.0 * radii[:, None]
-        velocity, turning = rng.standard_normal((2, n, 3)) * np.stack([np.ones_like(d), 1.0 / d])
-        if rng.random() < 0.3:
-            velocity[:], turning[:] = velocity[0], 0.0
-        gradient = rng.standard_normal((3, 3)) * (rng.random() < 0.5)
-        gradient -= np.trace(gradient) / 3.0 * np.eye(3)
-        for problem, given in (
-            (resistance, (velocity, turning)),
-            (mobility, (d * velocity, d**3 * turning)),
-        ):
-            scene = {"gradient": gradient, "radii": radii}
-            exact = problem(centres, *given, **scene, tolerance=FINE)
-            for tolerance in tolerances:
-                found = problem(centres, *given, **scene, tolerance=tolerance)
-                parts = [
-                    np.linalg.norm(
-                        (getattr(found, name) - getattr(exact, name)).reshape(n, -1), axis=1
-                    ) / d[:, 0] ** power
-                    for name, power in OUTPUTS[problem].items()
-                ]  # fmt: skip
-                error = np.max(parts, axis=0) / found.scale
-                rows += [
-                    (problem.__name__, item, n, found.minimum_gap, tolerance, error[i],
-                     found.error_estimate[i], str(found.status))
-                    for i in range(n)
-                ]  # fmt: skip
-        if progress is not None:
-            progress(item + 1, number)
-    columns = ["problem", "cluster", "spheres", "gap", "tolerance", "error", "estimate", "status"]
-    return pd.DataFrame(rows, columns=columns)
+    return {
+        name: [_cluster(*ends, stream(Purpose.MOVING, seed, number, k)) for k in range(scenes)]
+        for number, (name, ends) in enumerate(GAPS.items())
+    }
 
 
-def _cluster(rng) -> tuple[np.ndarray, np.ndarray]:
-    """Centres (n, 3) and radii (n,) [d_p], each sphere next to one that is there already."""
-    n = int(rng.choice([2, 3, 4, 6, 10, 20]))
-    radii = np.full(n, RADIUS)
-    if rng.random() < 0.5:
-        radii = np.exp(rng.uniform(*np.log(RADII), n))
-    widest = rng.choice([0.3, 3.0, 30.0])
+def moving_methods(tolerances: Sequence[float], scenes: int, few: int) -> list[Method]:
+    """This solver at several tolerances, an independent reference, peers.
+
+    scenes, few: scenes of each set for quick and for slow methods.
+    """
+    found = [Method(MULTIPOLE, f"tolerance {t:.0e}", moving(t), scenes) for t in tolerances]
+    found.append(Method("fundamental solutions", "tolerance 1e-03", _reference, few))
+    found.append(Method("Rotne-Prager inverse (pygrpy)", "", rotne_prager, scenes))
+    for subdivisions, blobs in enumerate((12, 42, 162)):
+        rigid = partial(_multiblob, subdivisions=subdivisions)
+        most = scenes if blobs < 162 else few
+        found.append(Method("rigid multiblob", f"{blobs} blobs", rigid, most))
+    found.append(Method("Stokesian dynamics", "F-T-S, exact pairs", _lubricated, scenes))
+    return found
+
+
+def all_spheres(force, estimate, true, scene) -> tuple[float, float | None]:
+    """Largest error of a force over the force or the fastest motion, and the largest estimate.
+
+    The motion is |velocity| + |gradient| of a sphere, as in the estimates of `resistance`.
+    """
+    _, velocity, angular_velocity = scene
+    turning = np.sqrt(2.0) * np.linalg.norm(angular_velocity, axis=1)
+    fastest = np.max(np.linalg.norm(velocity, axis=1) + turning)
+    size = np.maximum(np.linalg.norm(true, axis=1), fastest)
+    error = np.max(np.linalg.norm(force - true, axis=1) / size)
+    return error, None if estimate is None else estimate.max()
+
+
+def moving(tolerance: float):
+    """This solver at a tolerance, as `Method.forces`."""
+
+    def forces(scene):
+        solution = resistance(*scene, tolerance=tolerance)
+        return solution.force, solution.error_estimate
+
+    return forces
+
+
+def rotne_prager(scene):
+    """Forces (n, 3) [3 pi mu d_p U] from the inverse of pygrpy's mobility, rotations included."""
+    centres, velocity, angular_velocity = scene
+    n = len(centres)
+    mobility = mu(2.0 * centres, np.ones(n))
+    motion = np.concatenate([velocity.ravel(), 0.5 * angular_velocity.ravel()])
+    pull = np.linalg.solve(mobility, motion)[: 3 * n]
+    return -pull.reshape(n, 3) / (6.0 * np.pi), None
+
+
+def _reference(scene):
+    loads = reference_loads(*scene, tolerance=1e-3)
+    return loads.force, loads.error_estimate
+
+
+def _lubricated(scene):
+    return stokesian_dynamics(*scene), None
+
+
+def _multiblob(scene, subdivisions):
+    return moving_multiblob_forces(*scene, subdivisions), None
+
+
+def _cluster(narrowest, widest, rng):
     centres = np.zeros((1, 3))
-    while len(centres) < n:
-        k, own = rng.integers(len(centres)), radii[len(centres)]
-        gap = np.exp(rng.uniform(*np.log([SMALLEST_GAP, widest])))
-        direction = rng.standard_normal(3)
-        place = centres[k] + (radii[k] + own + gap) * direction / np.linalg.norm(direction)
-        apart = np.linalg.norm(centres - place, axis=1) - radii[: len(centres)] - own
-        if apart.min() >= 0.999 * SMALLEST_GAP:
+    while len(centres) < SPHERES:
+        direction = rng.normal(size=3)
+        direction /= np.linalg.norm(direction)
+        gap = np.exp(rng.uniform(np.log(narrowest), np.log(widest)))
+        place = centres[rng.integers(len(centres))] + (1.0 + gap) * direction
+        if cdist(centres, place[None]).min() >= 1.0 + narrowest:
             centres = np.vstack([centres, place])
-    return centres, radii
-
-
-def cost(numbers, fractions=(0.01, 0.1), tolerance: float = 1e-3, seed: int = 1) -> pd.DataFrame:
-    """Velocities of random clouds that settle, on this thread.
-
-    Columns spheres, volume_fraction, tolerance, seconds (after one to warm up; processor time),
-    iterations, error_estimate (largest), status, gap (smallest [d_p]) and memory (GiB, stated).
-    """
-    rows = []
-    mobility([[0, 0, 0], [0, 0, 1.1], [0, 0, 4.0]], np.ones((3, 3)))
-    for phi in fractions:
-        for n in numbers:
-            centres = random_cloud(n, phi, stream(Purpose.BENCHMARK, seed, n))
-            start = time.process_time()
-            found = mobility(centres, np.tile([0.0, 0.0, -1.0], (n, 1)), tolerance=tolerance)
-            seconds = time.process_time() - start
-            memory = needed_memory(centres, tolerance=tolerance) / 2**30
-            rows.append(
-                (n, phi, tolerance, seconds, found.iterations, found.error_estimate.max(),
-                 str(found.status), found.minimum_gap, memory)
-            )  # fmt: skip
-    columns = (
-        "spheres volume_fraction tolerance seconds iterations error_estimate status gap memory"
-    )
-    return pd.DataFrame(rows, columns=columns.split())
-
-
-if __name__ == "__main__":
-    samples = sampled(200)
-    samples["ratio"] = samples["estimate"] / samples["error"].clip(lower=1e-12)
-    samples["covered"] = samples["estimate"] >= samples["error"]
-    samples["within"] = samples["error"] <= samples["tolerance"]
-    samples["converged"] = samples["status"] == "converged"
-    groups = samples.groupby(["problem", "tolerance"])
-    print(groups[["covered", "within", "converged"]].mean().to_string())
-    print(groups["ratio"].describe(percentiles=[0.001, 0.01, 0.5]).to_string(float_format="%.3g"))
-    print(cost([2, 10, 30, 100, 300, 1000]).to_string(float_format="%.3g"))
+    return centres, *rng.normal(size=(2, SPHERES, 3))

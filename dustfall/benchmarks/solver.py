@@ -7,7 +7,9 @@ from functools import partial
 
 import numpy as np
 
+from dustfall.benchmarks.stokesian_dynamics import stokesian_dynamics
 from dustfall.extras import extra
+from dustfall.forces.formulas.reflections import reflected_forces
 from dustfall.spheres import flow_direction
 from dustfall.stokes.elements.boundary_elements import forces_by_elements
 from dustfall.stokes.elements.mesh import sphere_mesh
@@ -72,6 +74,8 @@ def methods(tolerances: Sequence[float], scenes: int, few: int) -> list[Method]:
         found.append(Method("paper's formulation", nodes, _plain(paper), most))
     found.append(Method("fundamental solutions", "tolerance 1e-08", _reference, few))
     found.append(Method("Rotne-Prager inverse (pygrpy)", "", _plain(rotne_prager), scenes))
+    found.append(Method("Stokesian dynamics", "F-T-S, exact pairs", _plain(lubricated), scenes))
+    found.append(Method("reflected dipoles", "closed formula", _plain(reflections), scenes))
     for subdivisions, blobs in enumerate((12, 42, 162)):
         rigid = partial(multiblob_forces, subdivisions=subdivisions)
         most = scenes if blobs < 162 else few
@@ -79,21 +83,34 @@ def methods(tolerances: Sequence[float], scenes: int, few: int) -> list[Method]:
     return found
 
 
+def reference_sphere(force, estimate, true, _) -> tuple[float, float | None]:
+    """Error of the force on the first sphere over 24, and what was estimated of it."""
+    error = np.abs(force[0] - true[0]).max() / STOKES_DRAG
+    return error, None if estimate is None else estimate[0]
+
+
 def time_against_error(
-    sets: Mapping[str, np.ndarray], methods: Sequence[Method], repeats: int = 3, progress=None
+    sets: Mapping[str, Sequence],
+    methods: Sequence[Method],
+    repeats: int = 3,
+    progress=None,
+    exact: Callable | None = None,
+    compare: Callable = reference_sphere,
 ) -> pd.DataFrame:
     """Solve the scenes of every set by every method.
 
-    sets: name -> centres (m, n, 3), the reference sphere first. Errors are those of the force on
-    it over 24, against this solver at 1e-8. One row for each set and method: set, method, setting,
+    sets: name -> scenes, as the methods take them. exact: what gives the true forces, this solver
+    at 1e-8 by default. compare: takes a method's forces and estimates, or None, the true forces and
+    the scene; returns error and estimate, by default of the force on the first sphere over 24.
+    One row for each set and method: set, method, setting,
     scenes, milliseconds (a scene, after one to warm up; median of `repeats`, or one run of a
     method that takes a second and more), error_median,
     error_95, error_max, covered (share of scenes whose estimate is at least the error) and
     estimate_over_error (median), both NaN for a method without estimates.
     """
-    exact, rows = multipole(EXACT), []
+    exact, rows = exact or multipole(EXACT), []
     for name, scenes in sets.items():
-        truth = np.array([exact(centres)[0][0] for centres in scenes])
+        truth = [exact(scene)[0] for scene in scenes]
         for method in methods:
             own = scenes[: method.most_scenes]
             start = time.perf_counter()
@@ -102,10 +119,10 @@ def time_against_error(
             seconds = []
             for _ in range(1 if slow else repeats):
                 start = time.perf_counter()
-                found = [method.forces(centres) for centres in own]
+                found = [method.forces(scene) for scene in own]
                 seconds.append(time.perf_counter() - start)
-            force = np.array([force[0] for force, _ in found])
-            error = np.abs(force - truth[: len(own)]).max(axis=1) / STOKES_DRAG
+            compared = [compare(*f, *true) for f, *true in zip(found, truth, own, strict=False)]
+            error, estimate = np.array(compared, dtype=float).T
             row = {
                 "set": name,
                 "method": method.name,
@@ -117,7 +134,6 @@ def time_against_error(
                 "error_max": error.max(),
             }
             if found[0][1] is not None:
-                estimate = np.array([estimate[0] for _, estimate in found])
                 row["covered"] = np.mean(estimate >= error)
                 row["estimate_over_error"] = np.median(estimate / np.maximum(error, 1e-16))
             rows.append(row)
@@ -156,6 +172,17 @@ def rotne_prager(centres, flow=(0.0, 1.0, 0.0)) -> np.ndarray:
     mobility = np.transpose(blocks, (0, 2, 1, 3)).reshape(3 * n, 3 * n)
     pull = np.linalg.solve(mobility, np.tile(flow_direction(flow), n))
     return STOKES_DRAG / (6.0 * np.pi) * pull.reshape(n, 3)
+
+
+def lubricated(centres, flow=(0.0, 1.0, 0.0)) -> np.ndarray:
+    """Forces (n, 3) [Re_p c_D] by Stokesian dynamics: fixed spheres are as moving ones."""
+    velocity = np.tile(flow_direction(flow), (len(centres), 1))
+    return -STOKES_DRAG * stokesian_dynamics(centres, velocity, np.zeros_like(velocity))
+
+
+def reflections(centres) -> np.ndarray:
+    """Force on the first sphere (1, 3) [Re_p c_D] by the closed formula of that name."""
+    return reflected_forces(np.asarray(centres)[None, 1:] - centres[0])
 
 
 def multipole(tolerance: float) -> Callable:

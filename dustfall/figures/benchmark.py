@@ -25,11 +25,12 @@ def front(milliseconds, error) -> np.ndarray:
 
 
 @styled
-def solver_benchmark(frame: pd.DataFrame) -> Figure:
+def solver_benchmark(frame: pd.DataFrame, error: str = "error of the force / 24") -> Figure:
     """Error of the force against time a scene, one panel a set; the dotted line is the front.
 
-    `frame`: set, method, setting, milliseconds, error_95, as `stokes.benchmark.time_against_error`
-    gives them. Raises ValueError for a missing column or an empty table.
+    `frame`: set, method, setting, milliseconds, error_95, as `benchmarks.solver.time_against_error`
+    gives them. `error`: what the error is called. Raises ValueError for a missing column or an
+    empty table.
     """
     require(frame, ["set", "method", "setting", "milliseconds", "error_95"], "solver_benchmark")
     sets = list(frame["set"].unique())
@@ -53,7 +54,7 @@ def solver_benchmark(frame: pd.DataFrame) -> Figure:
     for panel in panels[len(sets) :]:
         panel.set_visible(False)
     figure.supxlabel("time a scene [ms]", fontsize=9)
-    figure.supylabel("error of the force / 24, 95 % of scenes below", fontsize=9)
+    figure.supylabel(f"{error}, 95 % of scenes below", fontsize=9)
     figure.legend(
         handles=panels[0].get_legend_handles_labels()[0], loc="outside upper center", ncols=3
     )

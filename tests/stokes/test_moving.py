@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dustfall.benchmarks.moving import sampled
+from dustfall.benchmarks.moving_estimates import sampled
 from dustfall.stokes import (
     Status,
     fixed_spheres,

@@ -37,6 +37,24 @@ rule solver_benchmark:
         "../scripts/solver_benchmark.py"
 
 
+rule moving_benchmark:
+    """Run time of the solver of moving spheres, a reference and peers against the error."""
+    output:
+        error="results/benchmarks/moving.csv",
+        picture="results/benchmarks/moving.png",
+        print="results/benchmarks/moving.pdf",
+    log:
+        "logs/benchmarks/moving.log",
+    params:
+        library=library("moving_benchmark.py"),
+        seed=config["seed"],
+        scenes=config["benchmarks"]["scenes"],
+        few=config["benchmarks"]["few"],
+        tolerances=config["benchmarks"]["tolerances"],
+    script:
+        "../scripts/moving_benchmark.py"
+
+
 rule stress:
     """Gaps, distances, turns and condition numbers that strain the solver."""
     output:

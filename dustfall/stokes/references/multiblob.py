@@ -11,7 +11,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import brentq
 from scipy.spatial import ConvexHull
 
-from dustfall.spheres import checked_centres, flow_direction
+from dustfall.spheres import checked_centres, checked_vectors, flow_direction
 from dustfall.units import RADIUS, STOKES_DRAG
 
 
@@ -61,11 +61,13 @@ def _mobility(points, radius):
     return out
 
 
-def _forces(spheres, points, radius, flow):
-    """Force on each sphere [radii, mu = 1] whose blobs are at `points` about its centre."""
+def _forces(spheres, points, radius, velocities):
+    """Force on each sphere [radii, mu = 1] whose blobs, at `points` about its centre, are held in a
+    flow of the given velocities there, (n, 3) for all or (n, m, 3)."""
     blobs = (spheres[:, None] + points).reshape(-1, 3)
     factor = cho_factor(_mobility(blobs, radius), overwrite_a=True, check_finite=False)
-    pulls = cho_solve(factor, np.tile(flow, len(blobs)), check_finite=False)
+    velocities = np.broadcast_to(velocities, (len(spheres), len(points), 3))
+    pulls = cho_solve(factor, velocities.ravel(), check_finite=False)
     return pulls.reshape(len(spheres), len(points), 3).sum(axis=1)
 
 
@@ -101,3 +103,18 @@ def multiblob_forces(centres, subdivisions: int, flow=(0.0, 1.0, 0.0)) -> np.nda
     spheres = checked_centres(centres) / RADIUS
     force = _forces(spheres, size * shell(subdivisions), blob, flow_direction(flow))
     return STOKES_DRAG / (6.0 * np.pi) * force
+
+
+def moving_multiblob_forces(centres, velocity, angular_velocity, subdivisions: int) -> np.ndarray:
+    """Force on each of n spheres that translate and turn in fluid at rest, (n, 3) [3 pi mu d_p U].
+
+    centres [d_p], velocity [U], angular_velocity [U / d_p]: (n, 3). Others as `multiblob_forces`.
+    """
+    size, blob = _radii(subdivisions)
+    points = size * shell(subdivisions)
+    spheres = checked_centres(centres) / RADIUS
+    turning = np.cross(
+        checked_vectors("angular_velocity", angular_velocity, len(spheres))[:, None], points
+    )
+    moving = checked_vectors("velocity", velocity, len(spheres))[:, None] + RADIUS * turning
+    return _forces(spheres, points, blob, -moving) / (6.0 * np.pi)
