@@ -106,6 +106,7 @@ rule benchmarks:
     """Error against run time of solver and models; no part of `all`, as timings differ."""
     input:
         "results/benchmarks/solver.csv",
+        "results/benchmarks/moving.csv",
         "results/benchmarks/stress.csv",
         "results/figures/accuracy_vs_cost.png",
 
@@ -115,6 +116,7 @@ rule studies:
     input:
         "results/studies/step_size.csv",
         "results/studies/neighbour_numbers.csv",
+        "results/studies/moving_neighbours.csv",
 
 
 rule openfoam:

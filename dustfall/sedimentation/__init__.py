@@ -1,6 +1,11 @@
 """Sedimentation of monodisperse spheres in a periodic cube of fluid at rest."""
 
-from dustfall.sedimentation.closures import AllParticles, BackFlow, NearestNeighbours
+from dustfall.sedimentation.closures import (
+    AllParticles,
+    BackFlow,
+    MovingNeighbours,
+    NearestNeighbours,
+)
 from dustfall.sedimentation.neighbours import nearest_neighbours
 from dustfall.sedimentation.properties import Properties
 from dustfall.sedimentation.settle import Checkpoint, Output, Schedule, settle
@@ -13,6 +18,7 @@ __all__ = [
     "Checkpoint",
     "Closure",
     "Drag",
+    "MovingNeighbours",
     "NearestNeighbours",
     "Output",
     "Properties",

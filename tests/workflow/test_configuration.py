@@ -71,7 +71,13 @@ def test_rules_read_every_key_and_no_other():
         ("dataset.test_share", ["plan", "sweep", "model", "trial", "learning_curve", "evaluation"]),
         (
             "sedimentation.checkpoint_interval",
-            ["all_particles", "sedimentation", "study_of_a_step", "study_of_neighbours"],
+            [
+                "all_particles",
+                "sedimentation",
+                "study_of_a_step",
+                "study_of_moving_neighbours",
+                "study_of_neighbours",
+            ],
         ),
     ],
 )

@@ -172,6 +172,8 @@ def test_studies_are_no_part_of_all_and_take_one_run_a_setting(project):
         # 6 numbers of neighbours at 3 volume fractions
         "study_of_neighbours": 6 * 3,
         "neighbour_numbers": 1,
+        "study_of_moving_neighbours": 2,
+        "moving_neighbours": 1,
     }
 
 

@@ -111,3 +111,55 @@ rule neighbour_numbers:
         ],
     script:
         "../scripts/neighbour_numbers.py"
+
+
+rule study_of_moving_neighbours:
+    """Let a small cloud settle among neighbours that move as one, or each in its own way."""
+    input:
+        model=[],
+        start=[],
+    output:
+        trajectory=temp("results/studies/{case}_neighbours.nc"),
+        series="results/studies/{case}_neighbours.series.nc",
+    log:
+        "logs/studies/{case}_neighbours.log",
+    wildcard_constraints:
+        case="moving|together",
+    resources:
+        checkpoint_interval=config["sedimentation"]["checkpoint_interval"],
+    params:
+        library=settling_library("rotne_prager"),
+        # The same start for both.
+        seed=config["seed"],
+        stream=plan.start_stream("moving_neighbours"),
+        model="rotne_prager",
+        moving=lambda wc: wc.case == "moving",
+        particles=min(config["sedimentation"]["particles"]),
+        volume_fraction=max(config["studies"]["neighbours_at"]),
+        galileo_multiple=1.0,
+        change=config["sedimentation"]["galileo"]["change"],
+        properties=config["sedimentation"]["properties"],
+        start=config["sedimentation"]["start"],
+        schedule=plan.long_schedule(config, max(config["studies"]["neighbours_at"])),
+        precision=config["sedimentation"]["precision"],
+    script:
+        "../scripts/settle.py"
+
+
+rule moving_neighbours:
+    """Velocity, its variance, close pairs and overlaps where neighbours move in their own way."""
+    input:
+        series=expand(rules.study_of_moving_neighbours.output.series, case=["together", "moving"]),
+        trajectory=expand(
+            rules.study_of_moving_neighbours.output.trajectory, case=["together", "moving"]
+        ),
+    output:
+        "results/studies/moving_neighbours.csv",
+    log:
+        "logs/studies/moving_neighbours.log",
+    localrule: True
+    params:
+        library=library("moving_neighbours.py"),
+        start=plan.long_statistics_from(config, max(config["studies"]["neighbours_at"])),
+    script:
+        "../scripts/moving_neighbours.py"

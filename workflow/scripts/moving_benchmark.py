@@ -20,5 +20,5 @@ table = time_against_error(
     compare=all_spheres,
 )
 print(table.to_string(index=False))
-figure = solver_benchmark(table, "error of a force / force or motion")
+figure = solver_benchmark(table, "error of a force")
 save(figure, table, Path(snakemake.output.error).with_suffix(""))

@@ -94,12 +94,14 @@ class NearestNeighbours(Closure):
 
         def work(first, last):
             rows = nearest.order[first:last]
-            beta[rows], lateral[rows] = drag_coefficients(
-                self.model, velocity[rows], nearest.vectors(rows), rows
-            )
+            beta[rows], lateral[rows] = self._coefficients(state, rows)
 
         self._blocks.run(work)
         return Drag(beta, lateral)
+
+    def _coefficients(self, state: State, rows: np.ndarray):
+        """Return beta (m,) and the rest of the drag (m, 3) on the particles `rows`."""
+        return drag_coefficients(self.model, state.velocity[rows], self._list.vectors(rows), rows)
 
     @property
     def _list(self) -> NeighbourList:
@@ -108,15 +110,17 @@ class NearestNeighbours(Closure):
 
     def statistics(self, state: State, drag: Drag) -> dict[str, float]:
         """Return the fields of `series`, after the call for this state."""
+        means = {"inverse_beta_mean": (1 / drag.beta).mean(), "beta_mean": drag.beta.mean()}
+        return {**means, **self._counts()}
+
+    def _counts(self) -> dict[str, float]:
         nearest = self._list
         fresh, farthest_alone = changed_neighbours(nearest.index, self._index_before)
         overlaps, below_contact = contacts(
             nearest.vectors(nearest.order), nearest.order, nearest.index
         )
         return {
-            "inverse_beta_mean": (1 / drag.beta).mean(),
-            "beta_mean": drag.beta.mean(),
-            "new_neighbours": fresh / len(drag.beta),
+            "new_neighbours": fresh / len(nearest.index),
             "only_farthest": farthest_alone / fresh if fresh else np.nan,
             "overlaps": overlaps,
             "below_contact": below_contact,
