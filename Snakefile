@@ -117,6 +117,7 @@ rule studies:
         "results/studies/step_size.csv",
         "results/studies/neighbour_numbers.csv",
         "results/studies/moving_neighbours.csv",
+        "results/studies/moving_spheres.csv",
 
 
 rule openfoam:

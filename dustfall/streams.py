@@ -33,6 +33,7 @@ class Purpose(IntEnum):
     BACK_FLOW = 19
     MOVING = 20  # set, number
     MOVING_SAMPLE = 21  # number of the cluster
+    MOVING_SPHERES = 22  # number of the volume fraction
 
 
 def stream(purpose: Purpose, seed: int, *items: int) -> np.random.Generator:

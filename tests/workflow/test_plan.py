@@ -174,6 +174,7 @@ def test_studies_are_no_part_of_all_and_take_one_run_a_setting(project):
         "neighbour_numbers": 1,
         "study_of_moving_neighbours": 2,
         "moving_neighbours": 1,
+        "moving_spheres": 1,
     }
 
 

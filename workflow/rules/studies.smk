@@ -55,6 +55,22 @@ rule step_size:
         "../scripts/step_size.py"
 
 
+rule moving_spheres:
+    """Drag at random velocities by each closure, against the multipole solver."""
+    output:
+        "results/studies/moving_spheres.csv",
+    log:
+        "logs/studies/moving_spheres.log",
+    benchmark:
+        "benchmarks/studies/moving_spheres.tsv"
+    params:
+        library=library("moving_spheres.py"),
+        seed=config["seed"],
+        volume_fractions=config["studies"]["moving_spheres"],
+    script:
+        "../scripts/moving_spheres.py"
+
+
 rule study_of_neighbours:
     """Let a small cloud settle with another number of neighbours, by the Rotne-Prager inverse."""
     input:
