@@ -83,11 +83,7 @@ rule local_volume_fraction:
     input:
         trajectories=expand("results/sedimentation/{case}.nc", case=SETTLED_LARGEST_CASES),
     output:
-        report(
-            "results/analysis/local_volume_fraction.csv",
-            category="Sedimentation",
-            caption="../report/local_volume_fraction.rst",
-        ),
+        "results/analysis/local_volume_fraction.csv",
     log:
         "logs/analysis/local_volume_fraction.log",
     params:

@@ -63,6 +63,7 @@ TITLES = {
     "openfoam_settling": ("In time", "OpenFOAM and dustfall"),
     "voronoi_pdf": ("Clustering", "Densities of Voronoi volumes"),
     "voronoi_variance": ("Clustering", "Variance of Voronoi volumes"),
+    "lifetimes": ("Clustering", "Lifetimes of clusters"),
 }
 
 
@@ -101,6 +102,7 @@ TABLES = {
     "steady_state": ("results/analysis/steady_state.csv", "Sedimentation"),
     "independence_of_n": ("results/analysis/independence_of_n.csv", "Sedimentation"),
     "neighbour_changes": ("results/analysis/neighbour_changes.csv", "Sedimentation"),
+    "local_volume_fraction": ("results/analysis/local_volume_fraction.csv", "Sedimentation"),
 }
 if config["dataset"]["file"]:
     del TABLES["audit"]
@@ -118,8 +120,8 @@ CASES = plan.cases(config)
 # The cases that tell the steady state, and those of them among nearest neighbours; the cases of
 # `sedimentation.model` at the Galileo number of the properties that last as long as the paper's,
 # and those that tell the steady state; of either those with most particles, from dilute to dense;
-# the largest clouds
-# of which all particles feel each other; and the cases that differ in the Galileo number alone.
+# the largest clouds of which all particles feel each other; and the cases that differ in the
+# Galileo number alone.
 SETTLED_CASES = plan.settled_cases(config)
 NEIGHBOUR_CASES = [name for name in SETTLED_CASES if CASES[name].compared != plan.ALL_PARTICLES]
 PLAIN_CASES = [name for name in CASES if plan.is_plain(CASES[name]) and not CASES[name].long]
