@@ -32,6 +32,9 @@ PANELS = {
 }
 """Labels of each panel, and which of its axes are logarithmic."""
 
+VARIANCES = 200.0
+"""Largest over smallest variance that is drawn."""
+
 LEGEND = (0.85, 0.26)
 """Where the legend of the closures stands: in place of a sixth panel."""
 
@@ -67,6 +70,9 @@ def closures(frame: pd.DataFrame) -> Figure:
         ax.set_ylabel(up)
     for ax in (axes[0], axes[3]):
         ax.axhline(1, color=REFERENCE, lw=0.6, zorder=0)
+    # From rest it rises through decades within the first response times.
+    largest = frame.loc[frame["panel"] == "variance", "y"].max()
+    axes[1].set_ylim(largest / VARIANCES, 2 * largest)
     axes[2].set_ylim(1e-3, 2)
     axes[2].set_xlim(0, 4)
     letter(axes[: len(PANELS)])

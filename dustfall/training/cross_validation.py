@@ -96,18 +96,25 @@ def cross_validate(
     }
 
 
-def choose_winner(results: list[dict]) -> dict:
+CHOICES = ("one_standard_error", "smallest")
+"""How a configuration of layers is chosen among those that are compared."""
+
+
+def choose_winner(results: list[dict], choice: str = "one_standard_error") -> dict:
     """Choose one layer configuration for both components from results of `cross_validate`.
 
     Each component's errors are divided by that of its best configuration (mean over folds) and
     averaged over the two components, fold by fold: the error of a configuration. Among those whose
     mean error is within one standard error (over folds) of the smallest, the one with the fewest
-    parameters wins (the one standard error rule). The paper took the smallest mean error.
+    parameters wins (the one standard error rule); with `choice` "smallest", as in the paper, the
+    smallest mean error does.
 
     Returns the winner's layers, the smallest error's layers ("best"), the limit, and per
     configuration a row with layers, parameters (both components), error and standard_error.
     Raises ValueError when a configuration lacks a component or the numbers of folds differ.
     """
+    if choice not in CHOICES:
+        raise ValueError(f"choice is {choice!r}; it must be one of {', '.join(CHOICES)}")
     if not results:
         raise ValueError("there are no cross-validation results to choose from")
     errors: dict[str, dict[str, np.ndarray]] = {component: {} for component in COMPONENTS}
@@ -137,7 +144,7 @@ def choose_winner(results: list[dict]) -> dict:
             }
         )
     best = min(rows, key=lambda row: row["error"])
-    limit = best["error"] + best["standard_error"]
+    limit = best["error"] + (best["standard_error"] if choice == CHOICES[0] else 0.0)
     within = [row for row in rows if row["error"] <= limit]
     winner = min(within, key=lambda row: (row["parameters"], row["error"]))
     return {

@@ -62,6 +62,7 @@ def test_winner_is_the_smallest_within_one_standard_error():
     assert choice["layers"] == "40/40"
     assert choice["limit"] == pytest.approx(1.1)
     rows = {row["layers"]: row for row in choice["configurations"]}
+    assert choose_winner(table, "smallest")["layers"] == "90/90"
     assert rows["90/90"]["parameters"] == 1800
     assert rows["90/90"]["standard_error"] == pytest.approx(0.1)
 
@@ -75,6 +76,8 @@ def test_winner_needs_both_components_and_equal_folds():
         choose_winner([table[0], result("lateral", "9/9", 9, [1, 2, 3])])
     with pytest.raises(ValueError, match="no cross-validation results"):
         choose_winner([])
+    with pytest.raises(ValueError, match="choice is 'best'"):
+        choose_winner(table, "best")
 
 
 def test_a_fold_learns_the_same_alone_and_beside_others(few):

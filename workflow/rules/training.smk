@@ -36,6 +36,7 @@ rule winner:
     localrule: True
     params:
         library=library("winner.py"),
+        choice=config["idnn"]["choice"],
     script:
         "../scripts/winner.py"
 

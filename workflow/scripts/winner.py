@@ -13,7 +13,7 @@ from dustfall.training.cross_validation import choose_winner
 joblog.start(snakemake)
 
 results = [json.loads(Path(path).read_text()) for path in snakemake.input.results]
-winner = choose_winner(results)
+winner = choose_winner(results, snakemake.params.choice)
 folds = pd.concat(pd.DataFrame(result.pop("folds")).assign(**result) for result in results)
 folds["multiplications"] = [
     multiplications(*trial)
