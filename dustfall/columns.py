@@ -56,7 +56,7 @@ def read_columns(
     try:
         with h5py.File(path) as file:
             for name in (*names, *(name for name in optional if name in file)):
-                array = _stored(file, name)[()]
+                array = own_column(file, name)[()]
                 if file[name].attrs["sha256"] != _checksum(array):
                     raise ValueError(f"{name} does not match its checksum")
                 text = array.dtype.kind == "S"
@@ -71,11 +71,11 @@ def read_columns(
     return found
 
 
-def _stored(file: h5py.File, name: str) -> h5py.Dataset:
-    """A column that lies in the file itself, plainly, so that it takes no more memory than that.
+def own_column(file: h5py.File, name: str, packing: int = 1) -> h5py.Dataset:
+    """A column of numbers or text that lies in the file itself, so that its size bounds the memory.
 
-    Raises ValueError for a link to another file or a part of one, for objects of any length, and
-    for numbers that the file only claims to have, or has packed.
+    `packing` is how many bytes one of the file may hold. Raises ValueError for a link to another
+    file or a part of one, for objects of any length, and for more than the file can hold.
     """
     link = file.get(name, getlink=True)
     if link is None:
@@ -86,7 +86,7 @@ def _stored(file: h5py.File, name: str) -> h5py.Dataset:
         or column.is_virtual
         or column.external
         or column.dtype.kind == "O"
-        or column.nbytes > file.id.get_filesize()
+        or column.nbytes > packing * file.id.get_filesize()
     ):
         raise ValueError(f"{name} is no plain column of it")
     return column

@@ -16,15 +16,20 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from dustfall.columns import own_column
 from dustfall.dataset import OWN_LAW, Dataset, check
 from dustfall.extras import extra
 from dustfall.forces.frames import check_neighbours, sort_by_distance
+from dustfall.spheres import checked_numbers
 from dustfall.units import SPHERE_VOLUME
 
 with extra("files"):
     import h5py
 
 FORCE = ("fx", "fy", "fz")
+DEFLATE = 1032
+"""Bytes that one of a packed HDF5 file may hold, the most that deflate does."""
+
 OPTIONAL = ("volume_fraction", "reynolds", "weight")
 
 
@@ -107,7 +112,8 @@ def _table(path: Path, nrows: int | None = None) -> pd.DataFrame:
 
 def _neighbours_of(path: Path, names) -> int:
     """Number of neighbours that the columns of a table tell. Raises ValueError for others."""
-    found = [int(name[1:]) for name in names if re.fullmatch(r"x[1-9]\d*", name)]
+    # Three digits are more than any model takes.
+    found = [int(name[1:]) for name in names if re.fullmatch(r"x[1-9]\d{0,2}", name)]
     number = max(found, default=0)
     needed = [f"{axis}{j}" for j in range(1, max(number, 1) + 1) for axis in "xyz"]
     missing = [name for name in (*needed, *FORCE) if name not in names]
@@ -125,7 +131,12 @@ def _neighbours_of(path: Path, names) -> int:
 def _read_hdf5(path: Path) -> dict[str, np.ndarray]:
     with _opened(path) as file:
         names = [name for name in ("neighbours", "force", *OPTIONAL) if name in file]
-        return {name: np.asarray(file[name][()], dtype=float) for name in names}
+        try:
+            return {
+                name: checked_numbers(name, own_column(file, name, DEFLATE)[()]) for name in names
+            }
+        except (OSError, RuntimeError, KeyError, ValueError) as error:
+            raise ValueError(f"{path} is damaged or no file of such columns ({error})") from None
 
 
 def _opened(path: Path) -> h5py.File:

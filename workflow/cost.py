@@ -12,6 +12,7 @@ from math import ceil
 
 from dustfall.forces.features import KINDS
 from dustfall.forces.learned import multiplications
+from dustfall.own_data import shape
 from workflow import plan
 
 JOB_SECONDS = 3.6
@@ -86,14 +87,17 @@ class Cost:
 
 def cost(config: dict) -> Cost:
     """Foretell what the whole campaign of a complete configuration takes, were nothing done yet."""
-    numbers, stokes, settle = config["scenes"]["number"], config["stokes"], config["sedimentation"]
-    scenes = sum(numbers.values())
+    stokes, settle, own = config["stokes"], config["sedimentation"], config["dataset"]["file"]
+    # With data of one's own no scene is drawn or solved.
+    numbers = {} if own else config["scenes"]["number"]
+    drawn = sum(numbers.values())
+    scenes = shape(own)[0] if own else drawn
     kept = sum(min(number, stokes["keep_meshes"]) for number in numbers.values())
-    audited = min(scenes, stokes["audit"])
+    audited = min(drawn, stokes["audit"])
     shards = sum(ceil(number / config["scenes"]["shard_size"]) for number in numbers.values())
     trainings = list(_trainings(config))
     cases = plan.cases(config)
-    seconds = scenes * SOLVE_SECONDS[stokes["method"]]
+    seconds = drawn * SOLVE_SECONDS[stokes["method"]]
     seconds += (audited + kept) * SOLVE_SECONDS["elements"]
     seconds += sum(work * NETWORK_SECONDS for work, _ in trainings)
     # Coordinates, velocities and drag; what is unfinished lies in the checkpoint as well.

@@ -5,7 +5,6 @@ slow machine environment variables make it smaller: FAULT_KILLS, FAULT_TARGET (w
 makes), FAULT_FLIPS. The table says how many were tried.
 """
 
-import csv
 import multiprocessing
 import os
 import shutil
@@ -25,7 +24,10 @@ KILLS = int(os.environ.get("FAULT_KILLS", "100"))
 FLIPS = int(os.environ.get("FAULT_FLIPS", "20"))
 TARGET = os.environ.get("FAULT_TARGET", "all").split()
 TABLE = os.environ.get("FAULT_TABLE")
-"""File that the counts are written to, if any."""
+"""Page whose table takes the counts, if any."""
+
+RULE = "|---" * 7 + "|"
+"""Line under the head of that table, the last one of the page."""
 
 SMOKE = ("--configfile", "config/smoke.yaml")
 
@@ -49,19 +51,14 @@ def ledger() -> Iterator[dict[str, Counter]]:
         write_table(Path(TABLE), counts)
 
 
-def write_table(path: Path, counts: dict[str, Counter]) -> None:
-    """Put rows into the table, those of the same name in place of what is there."""
-    rows = {}
-    if path.exists():
-        with open(path, newline="") as file:
-            rows = {row["fault"]: row for row in csv.DictReader(file)}
+def write_table(page: Path, counts: dict[str, Counter]) -> None:
+    """Put rows into the table at the end of a page, those of the same name in place of old ones."""
+    head, rule, table = page.read_text(encoding="utf-8").rpartition(RULE)
+    rows = {row.split("|")[1].strip(): row for row in table.strip().splitlines()}
     for fault, count in counts.items():
-        found = {outcome: count[outcome] for outcome in OUTCOMES}
-        rows[fault] = {"fault": fault, "tried": sum(found.values()), **found}
-    with open(path, "w", newline="") as file:
-        writer = csv.DictWriter(file, ["fault", "tried", *OUTCOMES], lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows.values())
+        found = [sum(count.values()), *(count[outcome] for outcome in OUTCOMES)]
+        rows[fault] = f"| {fault} | {' | '.join(map(str, found))} |"
+    page.write_text("\n".join([f"{head}{rule}", *rows.values(), ""]), encoding="utf-8")
 
 
 def damages(whole: bytes, flips: int, seed: int) -> Iterator[bytes]:

@@ -46,6 +46,8 @@ def numbers(found) -> bytes:
         return b"".join(numbers(value) for value in found.values())
     if isinstance(found, tuple):
         return b"".join(map(numbers, found))
+    if found is None:
+        return b""
     return b"".join([str(found.dtype).encode(), found.tobytes()])
 
 

@@ -20,6 +20,7 @@ from safetensors.numpy import save_file
 from dustfall.columns import Column, read_columns, write_columns
 from dustfall.forces import learned
 from dustfall.forces.learned import SHIPPED, load_model
+from dustfall.own_data import read_own_data
 from dustfall.sedimentation.start import read_start
 from tests.faults.conftest import count
 from tests.sedimentation.runs import run
@@ -318,3 +319,15 @@ def test_a_model_file_that_is_too_large_is_refused_unread(tmp_path):
         file.truncate(2**40)
     with pytest.raises(ValueError, match="1099511627776 bytes: allowed are"):
         load_model(path)
+
+
+def test_own_data_that_claim_too_much_are_refused_unread(tmp_path):
+    table, packed = tmp_path / "own.csv", tmp_path / "own.h5"
+    table.write_text("x999999999,fx,fy,fz\n1,2,3,4\n")
+    with pytest.raises(ValueError, match=r"own\.csv has no column x1, "):
+        read_own_data(table)
+    with h5py.File(packed, "w") as file:
+        file.create_dataset("neighbours", (10**9, 5, 3), "f8", chunks=(1000, 5, 3))
+        file.create_dataset("force", (10**9, 3), "f8", chunks=(1000, 3))
+    with pytest.raises(ValueError, match=r"own\.h5 .*neighbours is no plain column of it"):
+        read_own_data(packed)
