@@ -13,6 +13,9 @@ from dustfall.files import atomic
 with extra("files"):
     import h5py
 
+DEFLATE = 1032
+"""Most bytes that one of a packed file holds: those of deflate, which HDF5 packs by."""
+
 
 class Column(NamedTuple):
     """What a column holds: units ("1" for plain numbers, "" for text and names), and in words."""

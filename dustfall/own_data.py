@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from dustfall.columns import own_column
+from dustfall.columns import DEFLATE, own_column
 from dustfall.dataset import OWN_LAW, Dataset, check
 from dustfall.extras import extra
 from dustfall.forces.frames import check_neighbours, sort_by_distance
@@ -27,9 +27,6 @@ with extra("files"):
     import h5py
 
 FORCE = ("fx", "fy", "fz")
-DEFLATE = 1032
-"""Bytes that one of a packed HDF5 file may hold, the most that deflate does."""
-
 OPTIONAL = ("volume_fraction", "reynolds", "weight")
 
 

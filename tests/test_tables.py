@@ -108,7 +108,7 @@ def write_hdf5(path, change):
 
 
 BAD_FILES = [
-    ("pickle.npy", write_npy, np.array([{}]), "pickle"),
+    ("pickle.npy", write_npy, np.array([{}]), "Python objects"),
     ("line.npy", write_npy, np.zeros(6), r"an array \(6,\) is not"),
     ("empty.npy", write_npy, np.zeros((0, 6)), "the table is empty"),
     ("names.npy", write_npy, np.zeros(2, [("neighbours", "f8", (5, 3))]), "there is no force"),

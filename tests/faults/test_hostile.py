@@ -7,6 +7,7 @@ import hashlib
 import json
 import os
 import pickle
+from io import BytesIO
 
 import h5py
 import numpy as np
@@ -321,11 +322,26 @@ def test_a_model_file_that_is_too_large_is_refused_unread(tmp_path):
         load_model(path)
 
 
+def npy_header(shape) -> bytes:
+    file = BytesIO()
+    form = {"descr": "<f8", "fortran_order": False, "shape": shape}
+    np.lib.format.write_array_header_1_0(file, form)
+    return file.getvalue()
+
+
 def test_own_data_that_claim_too_much_are_refused_unread(tmp_path):
     table, packed = tmp_path / "own.csv", tmp_path / "own.h5"
     table.write_text("x999999999,fx,fy,fz\n1,2,3,4\n")
     with pytest.raises(ValueError, match=r"own\.csv has no column x1, "):
         read_own_data(table)
+    claim = tmp_path / "own.npy"
+    claim.write_bytes(npy_header((10**12, 3)))
+    with pytest.raises(ValueError, match=r"own\.npy"):
+        read_start(claim, None, 1e-3)
+    with h5py.File(tmp_path / "start.h5", "w") as file:
+        file.create_dataset("position", (10**12, 3), "f8", chunks=(1000, 3))
+    with pytest.raises(ValueError, match=r"start\.h5: position is no plain column of it"):
+        read_start(tmp_path / "start.h5", None, 1e-3)
     with h5py.File(packed, "w") as file:
         file.create_dataset("neighbours", (10**9, 5, 3), "f8", chunks=(1000, 5, 3))
         file.create_dataset("force", (10**9, 3), "f8", chunks=(1000, 3))
