@@ -5,10 +5,12 @@ import re
 import shlex
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
 
+from dustfall.cli import parser
 from tests.workflow.conftest import Project
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -17,6 +19,10 @@ PAGES = {
     path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
     for path in [ROOT / "README.md", ROOT / "config/README.md", *sorted(ROOT.glob("docs/*.md"))]
 }
+
+
+WITHOUT_REFERENCE = {"analysis", "figures"}
+"""Rooms that serve the campaign: tables and figures are described in its report."""
 
 
 def parametrized(pattern: str):
@@ -52,3 +58,26 @@ def test_a_call_of_snakemake_has_a_plan(command, tmp_path):
 def test_a_call_of_make_has_its_target(command):
     target = shlex.split(command)[0]
     assert re.search(rf"^{target}:", (ROOT / "Makefile").read_text(), re.M)
+
+
+@pytest.mark.parametrize("command", parametrized(r"^    dustfall ([^\n#]*)"))
+def test_a_call_of_dustfall_is_understood(command):
+    arguments = shlex.split(command)
+    assert parser().parse_args(arguments).subcommand == arguments[0]
+
+
+def test_an_extra_that_the_readme_names_is_one():
+    with open(ROOT / "pyproject.toml", "rb") as file:
+        extras = tomllib.load(file)["project"]["optional-dependencies"]
+    named = re.findall(r"^\| `(\w+)` \|.*\|.*\|$", PAGES["README.md"].split("| extra |")[1], re.M)
+    assert {"files", "all"} <= set(named) <= set(extras)
+
+
+def test_the_site_leaves_out_no_page_and_no_public_room():
+    site, library = ((ROOT / name).read_text() for name in ("mkdocs.yml", "docs/api.md"))
+    assert all(f" {path.name}\n" in site for path in ROOT.glob("docs/*.md"))
+    rooms = [
+        path.parent for path in ROOT.glob("dustfall/*/__init__.py") if "__all__" in path.read_text()
+    ]
+    for room in rooms:
+        assert room.name in WITHOUT_REFERENCE or f"::: dustfall.{room.name}\n" in library
