@@ -1,11 +1,12 @@
 """Scenes and forces that another solver or an experiment gave, from a CSV or an HDF5 file.
 
-Columns of a CSV file, in any order: x1, y1, z1 to xk, yk, zk, the neighbours; fx, fy, fz, the
-force. Datasets of an HDF5 file: neighbours (m, k, 3), force (m, 3). In d_p and Re_p c_D, in the
-frame of the flow: x spanwise, y streamwise, z vertical, the reference sphere at the origin; the
-neighbours of a scene in any order. Either may have, of each scene, `volume_fraction` (without it,
-as k spheres have in the ball that reaches to the farthest), `reynolds`, which models do not see,
-and `weight`, of a scene in training.
+Columns of a CSV file, in any order: x1, y1, z1 to xk, yk, zk, the neighbours; force_x, force_y,
+force_z, as `dustfall predict` writes them. Datasets of an HDF5 file: neighbours (m, k, 3), force
+(m, 3). In d_p and Re_p c_D, which may follow a column's name in brackets, in the frame of the flow:
+x spanwise, y streamwise, z vertical, the reference sphere at the origin; the neighbours of a scene
+in any order. Either may have, of each scene, `volume_fraction` (without it, as k spheres have in
+the ball that reaches to the farthest), `reynolds`, which models do not see, and `weight`, of a
+scene in training.
 """
 
 import re
@@ -26,7 +27,7 @@ from dustfall.units import SPHERE_VOLUME
 with extra("files"):
     import h5py
 
-FORCE = ("fx", "fy", "fz")
+FORCE = ("force_x", "force_y", "force_z")
 OPTIONAL = ("volume_fraction", "reynolds", "weight")
 
 
@@ -100,11 +101,19 @@ def _read_csv(path: Path) -> dict[str, np.ndarray]:
 
 def _table(path: Path, nrows: int | None = None) -> pd.DataFrame:
     try:
-        return pd.read_csv(path, nrows=nrows)
+        table = pd.read_csv(path, nrows=nrows)
     except FileNotFoundError:
         raise FileNotFoundError(f"there is no file {path}") from None
     except ValueError as error:
         raise ValueError(f"{path} is no table: {error}") from None
+    names = []
+    for label in map(str, table.columns):
+        name, _, found = label.partition(" [")
+        units = "Re_p c_D" if name in FORCE else "1" if name in OPTIONAL else "d_p"
+        if found not in ("", f"{units}]"):
+            raise ValueError(f"{path} has {name} in {found.removesuffix(']')}: {units} is needed")
+        names.append(name)
+    return table.set_axis(names, axis=1)
 
 
 def _neighbours_of(path: Path, names) -> int:

@@ -5,7 +5,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from dustfall.cli import main
 from dustfall.dataset import OWN_LAW, read, split, write
+from dustfall.forces import load_model
 from dustfall.own_data import read_own_data, shape
 from dustfall.scenes import random_scenes
 
@@ -23,7 +25,7 @@ def write_csv(path, values):
         for j in range(k)
         for i, axis in enumerate("xyz")
     }
-    table |= {f"f{axis}": values["force"][:, i] for i, axis in enumerate("xyz")}
+    table |= {f"force_{axis}": values["force"][:, i] for i, axis in enumerate("xyz")}
     table |= {name: own for name, own in values.items() if name not in ("neighbours", "force")}
     pd.DataFrame(table).to_csv(path, index=False)
     return path
@@ -94,14 +96,24 @@ def test_values_that_cannot_be_are_refused_with_the_name_of_the_file(make, chang
         read_own_data(path)
 
 
+def test_what_a_prediction_writes_is_a_data_set(tmp_path):
+    np.save(tmp_path / "scenes.npy", columns()["neighbours"])
+    written = tmp_path / "forces.csv"
+    assert main(["predict", str(tmp_path / "scenes.npy"), "-o", str(written)]) == 0
+    dataset, _ = read_own_data(written)
+    assert shape(written) == columns()["neighbours"].shape[:2]
+    np.testing.assert_allclose(load_model().predict(dataset.neighbours), dataset.force, rtol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
         ("", "is no table"),
-        ("x1,y1,z1,fx,fy\n1,2,3,4,5\n", "has no column fz"),
-        ("x1,y1,z1,x3,y3,z3,fx,fy,fz\n", "has no column x2, y2, z2"),
-        ("x1,y1,z1,fx,fy,fz,phi\n", "has a column phi; allowed are x1"),
-        ("x1,y1,z1,fx,fy,fz\n1,2,3,4,5,many\n", "holds what is no number"),
+        ("x1,y1,z1,force_x,force_y\n1,2,3,4,5\n", "has no column force_z"),
+        ("x1,y1,z1,x3,y3,z3,force_x,force_y,force_z\n", "has no column x2, y2, z2"),
+        ("x1 [mm],y1,z1,force_x,force_y,force_z\n1,2,3,4,5,6\n", "has x1 in mm: d_p is needed"),
+        ("x1,y1,z1,force_x,force_y,force_z,phi\n", "has a column phi; allowed are x1"),
+        ("x1,y1,z1,force_x,force_y,force_z\n1,2,3,4,5,many\n", "holds what is no number"),
     ],
 )
 def test_tables_without_the_columns_are_refused(tmp_path, text, sentence):

@@ -7,8 +7,9 @@ SUMMARY = "train a force model on samples"
 
 DESCRIPTION = """\
 in:  x1, y1, z1, x2, ... [d_p], force_x, force_y, force_z [Re_p c_D]: neighbours and the force on
-     the sphere at the origin, in the frame of the flow (x spanwise, y streamwise, z vertical); in
-     h5 neighbours (m, k, 3) and force (m, 3), as in a campaign's results/dataset/forces.h5
+     the sphere at the origin, in the frame of the flow (x spanwise, y streamwise, z vertical), and,
+     if any, weight, of a sample's squared error; in h5 neighbours (m, k, 3), force (m, 3) and
+     weight (m,), as in a campaign's results/dataset/forces.h5 or what `dustfall predict` writes
 out: a model, for `dustfall predict --model`, `settle --model` and `export`
 One sample in ten is kept for validation; keep samples for your own test apart. The same samples
 and arguments give the same bits. Needs the extra train."""
@@ -53,6 +54,7 @@ def run(options) -> None:
     quantities = {
         "neighbours": Quantity((None, 3), "d_p", "neighbours as seen from the sphere"),
         "force": Quantity((3,), "Re_p c_D", "force on the sphere at the origin"),
+        "weight": Quantity((), "1", "of a sample's squared error", required=False),
     }
     samples = read_table(options.samples, quantities)
     given = {name: getattr(options, name) for name in SETTINGS}
@@ -70,6 +72,7 @@ def run(options) -> None:
             options.seed,
             device=options.device,
             progress=progress.report,
+            weight=samples.get("weight"),
         )
     model.header["training"]["command"] = options.command
     model.save(options.output)

@@ -47,7 +47,7 @@ def test_models_of_ten_neighbours_are_swept_trained_scored_and_drawn(own):
     results = own.folder / "results"
     dataset = read(results / "dataset/forces.h5")
     table = pd.read_csv(own.folder / "fixed_array.csv")
-    np.testing.assert_array_equal(dataset.force, table[["fx", "fy", "fz"]])
+    np.testing.assert_array_equal(dataset.force, table[["force_x", "force_y", "force_z"]])
     model = load_model(results / "model/anchored.safetensors")
     assert model.neighbours == 10
     assert model.predict(dataset.neighbours).shape == dataset.force.shape
@@ -57,7 +57,9 @@ def test_models_of_ten_neighbours_are_swept_trained_scored_and_drawn(own):
 
 
 def test_files_that_do_not_fit_are_refused_with_a_sentence(own):
-    (own.folder / "few.csv").write_text("x1,y1,z1,fx,fy,fz\n" + "1,2,3,4,5,6\n" * 100)
+    (own.folder / "few.csv").write_text(
+        "x1,y1,z1,force_x,force_y,force_z\n" + "1,2,3,4,5,6\n" * 100
+    )
     for file, sentence in (
         ("none.csv", "dataset.file: there is no file none.csv."),
         ("few.csv", "dataset.file is few.csv, which has 1 neighbours a scene, but must have 3 to"),

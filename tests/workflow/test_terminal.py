@@ -36,7 +36,7 @@ def on_a_terminal(project: Project, *arguments: str) -> list[str]:
 
 
 def test_a_run_leaves_a_line_of_its_jobs_and_a_failure_its_reason_last(project):
-    table = "x1,y1,z1,x2,y2,z2,x3,y3,z3,fx,fy,fz\n"
+    table = "x1,y1,z1,x2,y2,z2,x3,y3,z3,force_x,force_y,force_z\n"
     table += "".join(f"1.{row},2,3,4,5,6,7,8,9,1,2,inf\n" for row in range(100, 200))
     (project.folder / "own.csv").write_text(table)
     arguments = ("--configfile", "config/smoke.yaml", "--config", "dataset={file: own.csv}", "--")
