@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TextIO
@@ -31,6 +32,9 @@ SECONDS = {
 }
 """Core-seconds of a job in the campaign of docs/validation: they weigh the rules until this run has
 jobs of its own to go by."""
+
+ENOUGH = 0.03
+"""Share of the work that has to be done before the time to go is told."""
 
 OTHERS = 2.0
 """Core-seconds of a job of any other rule."""
@@ -73,6 +77,7 @@ class Run:
     took: dict[str, list[float]] = field(default_factory=dict)
     failed: set[int] = field(default_factory=set)
     done: int = 0
+    begun: float = 0.0
 
     @property
     def total(self) -> int:
@@ -100,19 +105,30 @@ class Run:
             self.failed.add(number)
 
     def seconds_to_go(self, now: float) -> float | None:
-        """Seconds until the last job is done, as if jobs went on as many at a time as now."""
-        expected = sum(SECONDS.get(rule, OTHERS) * len(took) for rule, took in self.took.items())
-        if not expected or not self.running:
+        """Seconds until the last job is done, as if as many jobs went on at a time as until now.
+
+        None before enough is done to tell.
+        """
+
+        def weight(jobs: Mapping[str, int]) -> float:
+            return sum(SECONDS.get(rule, OTHERS) * number for rule, number in jobs.items())
+
+        done = {rule: len(took) for rule, took in self.took.items()}
+        running = Counter(job.rule for job in self.running.values())
+        if weight(done) < ENOUGH * (weight(done) + weight(running) + weight(self.waiting)):
             return None
-        pace = sum(map(sum, self.took.values())) / expected
+        worked = sum(map(sum, self.took.values()))
+        pace = worked / weight(done)
 
         def seconds(rule: str) -> float:
             took = self.took.get(rule)
             return sum(took) / len(took) if took else pace * SECONDS.get(rule, OTHERS)
 
         left = sum(seconds(rule) * number for rule, number in self.waiting.items())
-        left += sum(max(seconds(job.rule) + job.since - now, 0) for job in self.running.values())
-        return left / len(self.running)
+        for job in self.running.values():
+            left += max(seconds(job.rule) + job.since - now, 0)
+            worked += now - job.since
+        return left * (now - self.begun) / max(worked, now - self.begun)
 
 
 class Terminal(logging.Handler):
@@ -132,6 +148,7 @@ class Terminal(logging.Handler):
                 self.run.waiting = Counter(
                     {rule: number for rule, number in stats.items() if rule not in ("total", "all")}
                 )
+                self.run.begun = now
                 self.begun.set()
                 threading.Thread(target=self._tick, daemon=True).start()
             case LogEvent.JOB_INFO:

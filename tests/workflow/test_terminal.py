@@ -70,6 +70,11 @@ def test_the_time_to_go_of_equal_jobs_is_what_they_take(cores):
     assert run.total == 10 * cores
 
 
+def test_little_work_done_tells_no_time():
+    run = run_of(seconds=1.0, jobs=1000, cores=1)
+    assert run.seconds_to_go(now=1.0) is None
+
+
 def test_a_job_that_is_tried_again_counts_once():
     run = run_of(seconds=1.0, jobs=4, cores=1)
     run.fail(1)
