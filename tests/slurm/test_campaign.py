@@ -38,9 +38,9 @@ def snakemakes_words(project: Project) -> str:
 
 
 def queue(cluster: Cluster, state: str) -> list[str]:
-    """Numbers of the jobs in a state, of those that are done as well."""
+    """Numbers of the jobs in a state, a regular expression; those that are done have one too."""
     answer = cluster.ask("squeue", "--states=all", "--noheader", "--format=%i %T")
-    return re.findall(rf"^(\S+) {state}$", answer, re.M)
+    return re.findall(rf"^(\S+) (?:{state})$", answer, re.M)
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +75,7 @@ def test_a_campaign_killed_on_the_way_ends_with_the_bits_of_a_local_run(
         os.killpg(run.pid, signal.SIGKILL)
         run.wait()
     cluster.ask("scancel", "--me")
-    wait_for(lambda: not queue(cluster, "RUNNING"), 120, "a job does not end")
+    wait_for(lambda: not queue(cluster, "RUNNING|COMPLETING"), 120, "a job does not end")
     project.run("--unlock")
     run = submit(project, cluster, log, *SMOKE, "--", "all")
     assert run.wait() == 0, log.read_text()[-3000:]

@@ -1,9 +1,12 @@
 """The smoke campaign through Snakemake: whole, and repeatable bit by bit."""
 
+import shutil
+
 import h5py
 import numpy as np
 import pytest
 
+from tests.workflow.browser import look_at
 from workflow import validation
 
 pytestmark = pytest.mark.slow
@@ -45,6 +48,24 @@ def test_a_lost_result_is_made_again_with_the_same_bytes(campaign):
     figure.unlink()
     campaign.run(*SMOKE, "--", "all")
     assert figure.read_bytes() == before
+
+
+@pytest.mark.browser
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium here to open the report")
+def test_every_figure_and_table_shows_in_the_report_which_leads_through_them(campaign, tmp_path):
+    campaign.run(*SMOKE, "--report", "report.html", "--", "all")
+    found = look_at(campaign.folder / "report.html", tmp_path)
+    results = campaign.folder / "results"
+    expected = [*results.glob("figures/*.png"), *results.glob("figures/*.gif")]
+    expected += results.glob("tables/*.html")
+    assert set(found["shown"]) == {str(path.relative_to(campaign.folder)) for path in expected}
+    for path, shown in found["shown"].items():
+        assert shown["size"] > (1 if path.endswith("html") else 300), path
+        assert shown["labels"], path
+        assert len(shown["caption"]) > 20, path
+    assert len(found["folders"]) == 4
+    for folder in found["folders"]:
+        assert f"{folder}:" in found["front"]
 
 
 def test_a_formula_added_as_one_file_appears_in_tables_and_figures(campaign):
