@@ -63,7 +63,7 @@ def test_every_figure_and_table_shows_in_the_report_which_leads_through_them(cam
         assert shown["size"] > (1 if path.endswith("html") else 300), path
         assert shown["labels"], path
         assert len(shown["caption"]) > 20, path
-    assert len(found["folders"]) == 4
+    assert found["folders"]
     for folder in found["folders"]:
         assert f"{folder}:" in found["front"]
 

@@ -74,6 +74,7 @@ TABLES = {
     "steady_state",
     "independence_of_n",
     "neighbour_changes",
+    "local_volume_fraction",
 }
 """Rules whose tables the report shows."""
 FROM_DATA = {"dataset": 1, "data_summary": 1, **DATA_FIGURES, **MODELS, **SETTLING}

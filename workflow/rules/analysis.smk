@@ -86,6 +86,7 @@ rule local_volume_fraction:
         "results/analysis/local_volume_fraction.csv",
     log:
         "logs/analysis/local_volume_fraction.log",
+    localrule: True
     params:
         library=library("local_volume_fraction.py"),
         starts=[plan.statistics_from(config, case) for case in SETTLED_LARGEST_CASES],

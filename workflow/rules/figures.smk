@@ -186,6 +186,7 @@ rule figure_lifetimes:
         "logs/figures/lifetimes.log",
     benchmark:
         "benchmarks/figures/lifetimes.tsv"
+    localrule: True
     params:
         library=library("figure_lifetimes.py"),
         starts=[plan.statistics_from(config, case) for case in SETTLED_LARGEST_CASES],
@@ -203,6 +204,7 @@ rule figure_closures:
         **figure("closures", "All particles"),
     log:
         "logs/figures/closures.log",
+    localrule: True
     params:
         library=library("figure_closures.py"),
         seed=config["seed"],
@@ -219,6 +221,7 @@ rule figure_trajectories_all_particles:
         **figure("trajectories_all_particles", "All particles"),
     log:
         "logs/figures/trajectories_all_particles.log",
+    localrule: True
     params:
         library=library("figure_trajectories.py"),
     script:
