@@ -48,8 +48,8 @@ class Resistance:
     [pi mu d_p^2 U]. error_estimate: (n,), the largest error of |force| / d, |torque| / d^2 and
     |stresslet| / d^2, d the sphere's diameter, over `scale`. scale: (n,) [U], the larger of what
     these themselves are and of the fastest motion of any sphere against the undisturbed flow,
-    |velocity| + d |gradient|. iterations, residual: of the linear system, the latter relative. minimum_gap: smallest distance
-    of two surfaces [d_p], inf for one sphere. status: how it ended.
+    |velocity| + d |gradient|. iterations, residual: of the linear system, the latter relative.
+    minimum_gap: smallest distance of two surfaces [d_p], inf for one sphere. status: how it ended.
     """
 
     force: np.ndarray

@@ -58,7 +58,7 @@ LEVELS = (
 """Each has more degrees than the one before; the first two are always solved."""
 
 SAFETY = 2.0
-"""Of the error estimate over the change between levels (`benchmarks.moving_estimates` samples it)."""
+"""Of the error estimate over the change of levels; `benchmarks.moving_estimates` samples it."""
 
 FIRST_GOAL = 10.0
 """Residual of the first level, over that of the others."""
