@@ -101,12 +101,11 @@ def time_against_error(
 
     sets: name -> scenes, as the methods take them. exact: what gives the true forces, this solver
     at 1e-8 by default. compare: takes a method's forces and estimates, or None, the true forces and
-    the scene; returns error and estimate, by default of the force on the first sphere over 24.
-    One row for each set and method: set, method, setting,
-    scenes, milliseconds (a scene, after one to warm up; median of `repeats`, or one run of a
-    method that takes a second and more), error_median,
-    error_95, error_max, covered (share of scenes whose estimate is at least the error) and
-    estimate_over_error (median), both NaN for a method without estimates.
+    the scene; returns error and estimate, by default of the force on the first sphere over 24. One
+    row for each set and method: set, method, setting, scenes, milliseconds (a scene, after one to
+    warm up; median of `repeats`, or one run of a method that takes a second and more),
+    error_median, error_95, error_max, covered (share of scenes whose estimate is at least the
+    error) and estimate_over_error (median), both NaN for a method without estimates.
     """
     exact, rows = exact or multipole(EXACT), []
     for name, scenes in sets.items():
@@ -121,7 +120,10 @@ def time_against_error(
                 start = time.perf_counter()
                 found = [method.forces(scene) for scene in own]
                 seconds.append(time.perf_counter() - start)
-            compared = [compare(*f, *true) for f, *true in zip(found, truth, own, strict=False)]
+            compared = [
+                compare(*one, true, scene)
+                for one, true, scene in zip(found, truth, own, strict=False)
+            ]
             error, estimate = np.array(compared, dtype=float).T
             row = {
                 "set": name,

@@ -40,7 +40,8 @@ NEGLIGIBLE = 1e-12
 """Degrees are taken in until a sphere's terms have decayed to this on the plane xi = 0; the loads
 are products of two such terms, off by a part of 1e-15 or less."""
 
-FEWEST_DEGREES = 24
+FEWEST_DEGREES, MOST_DEGREES = 24, 60_000
+"""The most take ten seconds of a core and 1 GB."""
 
 REFINEMENTS = 2
 """Each multiplies the error by 1e-16 times the condition number, 1e6 at a gap of 1e-4 d_p."""
@@ -96,8 +97,9 @@ def pair_resistance(gap: float, radii=(RADIUS, RADIUS)) -> PairResistance:
     gap: between the surfaces [d_p]. radii: of the first and the second sphere [d_p]. What is given
     as a gap is exact; a distance near contact is not. The number of degrees, and so the time, grows
     as larger radius / sqrt(gap x smaller radius): below a second for equal spheres at 1e-4 d_p.
-    Raises ValueError for radii that are not two positive numbers within LARGEST_RATIO of each other
-    and for gaps outside SMALLEST_GAP to LARGEST_GAP, both over the smaller radius.
+    Raises ValueError for radii that are not two positive numbers within LARGEST_RATIO of each
+    other, for gaps outside SMALLEST_GAP to LARGEST_GAP, both over the smaller radius, and where
+    more than MOST_DEGREES would be needed.
     """
     radii = checked_radii(radii, 2)
     if radii.max() > LARGEST_RATIO * radii.min():
@@ -108,6 +110,11 @@ def pair_resistance(gap: float, radii=(RADIUS, RADIUS)) -> PairResistance:
             f"here {SMALLEST_GAP * radii.min():g} to {LARGEST_GAP * radii.min():g} d_p"
         )
     pair = _Pair(gap, radii)
+    if len(pair.n) > MOST_DEGREES:
+        raise ValueError(
+            f"gap {gap:.6g} d_p of radii {radii.tolist()}: {len(pair.n)} degrees are needed, at "
+            f"most {MOST_DEGREES} are allowed; wider gaps and radii more alike need fewer"
+        )
     along, across, planar = (_resistance(pair, m) for m in range(3))
     return PairResistance(along, _torsion(pair), across, planar)
 
@@ -225,7 +232,7 @@ def _resistance(pair: _Pair, m: int) -> np.ndarray:
 
 
 def _motions(pair, m, sphere):
-    """The sphere and its velocity in each motion: series of w, v_rho +- v_phi, without `decay`.
+    """The sphere and its velocity in each of its motions: series of fields, without `decay`.
 
     1, z - z(centre) and rho are series of P_n, P_n and P_n^1 that are regular in the sphere; on the
     axis they follow from that of 1 / |r - r'|.

@@ -212,6 +212,7 @@ def test_a_far_sphere_feels_the_flow_of_the_other_by_faxens_laws(turns):
         (1.0, (0.5, np.inf), "radius of sphere 1 is inf"),
         (1.0, (0.5,), "radii must have the shape"),
         (1.0, (0.5, 60.0), "ratio may be 100 at most"),
+        (1e-6, (0.5, 50.0), "degrees are needed, at most 60000 are allowed"),
     ],
 )
 def test_pairs_that_mean_nothing_are_refused(gap, radii, message):
