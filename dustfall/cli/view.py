@@ -28,6 +28,9 @@ def run(options) -> None:
 
         from dustfall.figures.movie import save_movie
     from dustfall.progress import Progress
+    from dustfall.sedimentation.trajectory import open_run
 
+    with open_run(options.trajectory):
+        pass  # a file that is missing or damaged is refused by its name
     with Progress("view", "pictures") as progress, xr.open_dataset(options.trajectory) as run:
         save_movie(run, options.output, options.pictures, progress=progress.report)

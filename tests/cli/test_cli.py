@@ -194,7 +194,9 @@ ERRORS = {
     "export run.nc --to json -o {0}/x": "run.nc is written as vtkhdf",
     "export isolated --to onnx -o {0}/x": "isolated has no networks",
     "export anchored --to json --units si -o {0}/x": "--units means nothing to the format json",
-    "view {0}/missing.nc -o {0}/x.gif": "missing.nc",
+    "view {0}/missing.nc -o {0}/x.gif": "there is no file .*missing.nc",
+    "view {0}/c.csv -o {0}/x.gif": "c.csv is damaged or no NetCDF file",
+    "export {0}/missing.nc --to pvd -o {0}/x.pvd": "there is no file .*missing.nc",
 }  # fmt: skip
 
 
