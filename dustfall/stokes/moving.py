@@ -63,6 +63,9 @@ SAFETY = 2.0
 FIRST_GOAL = 10.0
 """Residual of the first level, over that of the others."""
 
+PLAN_BYTES = 80
+"""For each of n^2 pairs: distances, slopes, degrees, and what the plan works with."""
+
 ROUNDING = 1e-14
 """Relative residual that no iteration gets below."""
 
@@ -176,7 +179,9 @@ class _Scene:
 
 
 def _checked_scene(centres, radii, tolerance) -> _Scene:
-    radii = checked_radii(radii, len(np.atleast_1d(centres)))
+    n = len(np.atleast_1d(centres))
+    _check_memory(n, PLAN_BYTES * n**2)
+    radii = checked_radii(radii, n)
     centres = checked_centres(centres, radii)
     tolerance = checked_tolerance(tolerance, SMALLEST_TOLERANCE, LARGEST_TOLERANCE)
     return _Scene(centres, radii, centre_distances(centres), tolerance)
@@ -287,7 +292,7 @@ def _solved(scene, amplified, response, right, measured, units, scale) -> tuple:
     iterations = 0
     for level in LEVELS:
         plan = _planned(scene, amplified, level)
-        _check_memory(plan)
+        _check_memory(n, _memory(plan))
         coupled = _coupled(scene, plan)
         # The first is there to be compared with.
         enough = goal if coarser is not None else FIRST_GOAL * goal
@@ -356,7 +361,8 @@ def _iterated(right, before, coupled, response, goal):
 def needed_memory(centres, radii=None, tolerance: float = 1e-4, moves: bool = False) -> int:
     """Bytes that `mobility`, or `resistance` where the spheres' `moves` are given, takes, about.
 
-    Twenty times n^2, and not in this number, is taken to find it. Raises ValueError as they do.
+    PLAN_BYTES n^2 of them are taken to find it. Raises ValueError as they do, and MemoryError where
+    even these are not there.
     """
     scene = _checked_scene(centres, radii, tolerance)
     return _memory(_planned(scene, moves, LEVELS[1]))
@@ -371,15 +377,16 @@ def _memory(plan: MovingPlan) -> int:
     couplings = entries[degrees] * np.where(close, 8, 1) + 4 * (degrees + 2)
     couplings = np.sum(np.where((degrees == 1) & ~close, 0, couplings))
     moments = 3 * np.sum((np.maximum(plan.degrees.max(axis=1), 1) + 1) ** 2)
-    return 8 * int(couplings + moments * (MOST_ITERATIONS + 20) + 8 * plan.degrees.size)
+    krylov = moments * (MOST_ITERATIONS + 20)
+    return 8 * int(couplings + krylov) + PLAN_BYTES * plan.degrees.size
 
 
-def _check_memory(plan: MovingPlan) -> None:
-    """Raise MemoryError, with both sizes, where `_memory` is more than there is."""
-    needed, there = _memory(plan), available_memory()
+def _check_memory(n: int, needed: int) -> None:
+    """Raise MemoryError, with both sizes, where that many bytes are more than there are."""
+    there = available_memory()
     if needed > there:
         raise MemoryError(
-            f"{len(plan.degrees)} spheres take {needed / 2**30:.1f} GiB at this tolerance: only "
+            f"{n} spheres take {needed / 2**30:.1f} GiB at this tolerance: only "
             f"{there / 2**30:.1f} GiB of memory are available"
         )
 

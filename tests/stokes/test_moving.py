@@ -292,3 +292,8 @@ def test_memory_that_is_not_there_is_not_taken(monkeypatch):
     monkeypatch.setattr("dustfall.stokes.moving.available_memory", lambda: 2**16)
     with pytest.raises(MemoryError, match=r"3 spheres take .* GiB .* only 0.0 GiB"):
         mobility(triangle(3.0), np.ones((3, 3)))
+
+
+def test_a_million_spheres_are_refused_before_their_distances_are_taken():
+    with pytest.raises(MemoryError, match="1000000 spheres take"):
+        mobility(np.zeros((1_000_000, 3)), np.zeros((1_000_000, 3)))
