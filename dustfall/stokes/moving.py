@@ -55,7 +55,8 @@ LEVELS = (
     _Level(0.05, 5, MOST_DEGREE),
     _Level(0.005, 6, MOST_DEGREE),
 )
-"""Each has more degrees than the one before; the first two are always solved."""
+"""The first two are always solved. Where pairs have the same degrees on both, what the finer one
+leaves out by the rule of `moving_plan` is the estimate."""
 
 SAFETY = 2.0
 """Of the error estimate over the change of levels; `benchmarks.moving_estimates` samples it."""
