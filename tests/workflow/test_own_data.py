@@ -39,21 +39,15 @@ def test_nothing_is_drawn_or_solved_and_all_else_is_planned(own):
 
 
 @pytest.mark.slow
-def test_models_of_ten_neighbours_are_swept_trained_scored_and_drawn(own):
-    own.run(
-        *SMALL, "--", "results/model/evaluation.csv", "results/figures/spearman.png",
-        "results/figures/force_scatter.png", "results/dataset/summary.json",
-    )  # fmt: skip
+def test_models_of_ten_neighbours_are_swept_trained_and_drawn(own):
+    own.run(*SMALL, "--", "results/model/idnn.safetensors", "results/figures/spearman.png")
     results = own.folder / "results"
     dataset = read(results / "dataset/forces.h5")
     table = pd.read_csv(own.folder / "fixed_array.csv")
     np.testing.assert_array_equal(dataset.force, table[["force_x", "force_y", "force_z"]])
-    model = load_model(results / "model/anchored.safetensors")
+    model = load_model(results / "model/idnn.safetensors")
     assert model.neighbours == 10
     assert model.predict(dataset.neighbours).shape == dataset.force.shape
-    scores = pd.read_csv(results / "model/evaluation.csv")
-    assert set(scores["radial_law"]) == {"own"}
-    assert {"anchored", "idnn", "dense", "rotne_prager"} <= set(scores["model"])
 
 
 def test_files_that_do_not_fit_are_refused_with_a_sentence(own):
