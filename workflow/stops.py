@@ -59,9 +59,9 @@ def clear() -> None:
 
 def announce(logs) -> None:
     """Say at the very end why the run stopped, and what goes on; `logs` are those of Snakemake."""
-    command = shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])
+    command = shlex.join(["snakemake", *sys.argv[1:]])
     words = "; ".join(dict.fromkeys(_notes())) or _killed(logs) or "the cause is shown above"
-    atexit.register(print, f"Stopped: {words}. To go on: {command}", flush=True)
+    atexit.register(print, f"Stopped: {words}. To go on: {command}", file=sys.stderr, flush=True)
 
 
 def _notes() -> list[str]:
