@@ -19,15 +19,17 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 import yaml
+from scipy import stats
 
 from dustfall.analysis.references import (
+    MATCHED_GAMMA,
     PAPER_SCORES,
     PAPER_SETTLING,
 )
 from dustfall.benchmarks.solver import MULTIPOLE
-from dustfall.figures.style import model_title
+from dustfall.figures.style import CLOSURES, model_title
 from dustfall.scenes import LAWS
-from dustfall.sedimentation.closures import AllParticles
+from dustfall.sedimentation.closures import AllParticles, BackFlow
 from dustfall.sedimentation.closures.back_flow import BATCHELOR_COEFFICIENT
 from dustfall.sedimentation.properties import Properties
 from dustfall.sedimentation.state import box_length
@@ -45,6 +47,7 @@ PICTURES = {
         for name in (
             "accuracy_vs_cost",
             "audit",
+            "closures",
             "cloud_spectra",
             "error_by_distance",
             "force_pdf",
@@ -56,6 +59,7 @@ PICTURES = {
             "scene_meshes",
             "trajectories",
             "trajectories_3d",
+            "trajectories_all_particles",
             "voronoi_variance",
         )
     },
@@ -72,6 +76,12 @@ PAIR_EXPONENTS = (4, 6, 8)
 
 COMPARED_SETS = 2
 """Sets of scenes in which methods are compared: the last ones, the densest decade and contact."""
+
+CLOSURE_TIMES = (10, 50, 100)
+"""Times [tau] at which closures are compared."""
+
+CROWDED_CELL = 0.5
+"""Volume of a Voronoi cell over the mean below which its particle is crowded."""
 
 DATA_ROWS = {
     ("share_15_percent_below_stokes", "streamwise"): "share at least 15 % below Stokes",
@@ -329,6 +339,13 @@ def settling(steady: pd.DataFrame, configuration: dict) -> pd.DataFrame:
     return _with_paper(table, paper).sort_values(["volume_fraction", "n"], ignore_index=True)
 
 
+def apparent(steady: pd.DataFrame, configuration: dict) -> pd.DataFrame:
+    """The same with the paper's modified viscosity over eta, beta, and its Ga* = Ga / beta^2."""
+    table = settling(steady, configuration)
+    velocity = table["value"].fillna(table["end"])
+    return table.assign(viscosity=1 / velocity, apparent_galileo=table["galileo"] * velocity**2)
+
+
 def neighbour_numbers(table: pd.DataFrame) -> pd.DataFrame:
     """Settling velocity by number of neighbours; a point of the paper stands bare, a bound not."""
     return table.assign(relation=table["relation"].replace("=", None))
@@ -373,6 +390,46 @@ def all_particles(steady: pd.DataFrame) -> pd.DataFrame:
         box_length(n, phi) for n, phi in zip(table["n"], table["volume_fraction"], strict=True)
     ]
     return table.assign(box_length=length).sort_values(["volume_fraction", "n"], ignore_index=True)
+
+
+def closures(figure: pd.DataFrame) -> pd.DataFrame:
+    """Closures beside each other at the densest phi: one row a closure and number of particles.
+
+    velocity_t and variance_t at t = 10, 50 and 100 tau, or at the last step before; contact, the
+    pair distribution in the innermost shell; crowded, the share of Voronoi cells below
+    `CROWDED_CELL`, and random_crowded, that of random points.
+    """
+    rows = []
+    for (model, n), own in figure.groupby(["model", "n"]):
+        panel = dict(list(own.groupby("panel")))
+        row = {"model": model, "title": model_title(model), "n": n, "box": own["box"].iloc[0]}
+        for name, column in {"velocity": "mean", "variance": "variance"}.items():
+            curve = panel[column].sort_values("x")
+            row |= {f"{name}_{t}": np.interp(t, curve["x"], curve["y"]) for t in CLOSURE_TIMES}
+        row["contact"] = panel["pairs"].sort_values("x")["y"].iloc[0]
+        cells = panel["voronoi"].sort_values("x")
+        width = cells["x"].diff().iloc[1]
+        row["crowded"] = width * cells.loc[cells["x"] < CROWDED_CELL, "y"].sum()
+        shape, scale = MATCHED_GAMMA
+        row["random_crowded"] = stats.gamma.cdf(CROWDED_CELL, shape, scale=scale)
+        rows.append(row)
+    return pd.DataFrame(rows).sort_values(["model", "n"], ignore_index=True)
+
+
+def back_flow(steady: pd.DataFrame) -> pd.DataFrame:
+    """Nearest neighbours without and with back-flow: one row a phi, of the clouds that ran both."""
+    velocity = steady[steady["quantity"] == "settling_velocity_mean"]
+    own = velocity[velocity["model"] == BackFlow.name]
+    if own.empty:
+        return own
+    model = velocity.loc[~velocity["model"].isin(CLOSURES), "model"].value_counts().index[0]
+    table = _steady_columns(own).merge(
+        _steady_columns(velocity[velocity["model"] == model]),
+        on=["n", "volume_fraction", "galileo"],
+        suffixes=("", "_five"),
+    )
+    random = 1 + BATCHELOR_COEFFICIENT * table["volume_fraction"]
+    return table.assign(random=random).sort_values("volume_fraction", ignore_index=True)
 
 
 def oseen(configuration: dict) -> pd.DataFrame:
@@ -555,11 +612,28 @@ TABLES: dict[str, tuple[Callable[..., pd.DataFrame], tuple[str, ...]]] = {
     "voronoi": (voronoi, ("results/figures/voronoi_variance.csv",)),
     "run_times": (run_times, ("benchmarks",)),
 }
-"""Each table of the page: the function that reduces its sources to it, and these."""
+"""Each table of the page of validation: the function that reduces its sources to it, and these."""
+
+CLOSURE_TABLES: dict[str, tuple[Callable[..., pd.DataFrame], tuple[str, ...]]] = {
+    "closures": (closures, ("results/figures/closures.csv",)),
+    "back_flow": (back_flow, (STEADY_STATE,)),
+    "all_particles": (all_particles, (STEADY_STATE,)),
+    "moving_spheres": (pd.DataFrame, ("results/studies/moving_spheres.csv",)),
+}
+"""The same of the page of all particles."""
+
+PAPER_TABLES: dict[str, tuple[Callable[..., pd.DataFrame], tuple[str, ...]]] = {
+    "settling": (apparent, (STEADY_STATE, CONFIGURATION)),
+}
+"""The same of the page that goes through the paper."""
+
+PAGES = {"validation": TABLES, "all_particles": CLOSURE_TABLES, "paper": PAPER_TABLES}
+"""Pages that are written from a campaign, docs/<name>.md from docs/<name>.md.jinja and the tables
+in docs/<name>/."""
 
 
-def collect(campaign: Path, target: Path, found: Provenance) -> None:
-    """Write the tables, the configuration and the provenance of a campaign into a folder.
+def collect(campaign: Path, target: Path, found: Provenance, tables=None) -> None:
+    """Write tables, by default `TABLES`, configuration and provenance of a campaign to a folder.
 
     A table is left out, and one of a former campaign removed, where a source is missing from the
     folder `campaign`, or where it has no rows. Raises FileNotFoundError where the campaign has not
@@ -569,7 +643,7 @@ def collect(campaign: Path, target: Path, found: Provenance) -> None:
     for old in target.glob("*.csv"):
         old.unlink()
     shutil.copyfile(campaign / CONFIGURATION, target / "config.yaml")
-    for name, (reduce, paths) in TABLES.items():
+    for name, (reduce, paths) in (TABLES if tables is None else tables).items():
         if all((campaign / path).exists() for path in paths):
             table = reduce(*(_read(campaign / path) for path in paths))
             if not table.empty:

@@ -68,8 +68,10 @@ def benchmarked(tmp_path) -> Path:
 FOUND = validation.Provenance("abc", "2026-01-01", "a processor", 2, {"numpy": "2"}, "config")
 
 
-def test_the_page_is_what_its_tables_make():
-    assert validation.page(TEMPLATE, TABLES) == PAGE
+@pytest.mark.parametrize("name", validation.PAGES)
+def test_a_page_is_what_its_tables_make(name):
+    page = (DOCS / f"{name}.md").read_text(encoding="utf-8")
+    assert validation.page(DOCS / f"{name}.md.jinja", DOCS / name) == page
 
 
 @pytest.mark.parametrize("table", sorted(path.name for path in TABLES.glob("*.csv")))

@@ -7,6 +7,7 @@ FURTHER = [
     "results/benchmarks/spheres.csv",
     "results/benchmarks/stress.csv",
     "results/figures/accuracy_vs_cost.csv",
+    "results/studies/moving_spheres.csv",
     "results/studies/neighbour_numbers.csv",
     "results/studies/step_size.csv",
 ]
@@ -17,7 +18,9 @@ rule validation:
     input:
         campaign=rules.all.input,
         further=[file for file in FURTHER if os.path.exists(file)],
-        template=ROOT / "docs" / "validation.md.jinja",
+        templates=[
+            ROOT / "docs" / f"{name}.md.jinja" for name in ("validation", "all_particles", "paper")
+        ],
     # Without an output it runs whenever it is asked for: the page at hand may be of another campaign.
     log:
         "logs/validation.log",

@@ -1,18 +1,18 @@
-"""Write the page of validation from what the campaign left, and its tables and pictures."""
+"""Write the pages whose numbers a campaign left, and their tables and pictures."""
 
 from pathlib import Path
 
 import joblog
 from dustfall.files import atomic
-from workflow.validation import collect, copy_pictures, page, provenance
+from workflow.validation import PAGES, collect, copy_pictures, page, provenance
 
 joblog.start(snakemake)
 
 params = snakemake.params
 campaign, docs = Path(), Path(params.docs)
-tables = docs / "validation"
-collect(campaign, tables, provenance(params.configuration))
+found = provenance(params.configuration)
 copy_pictures(campaign, docs / "pictures")
-with atomic(docs / "validation.md") as path:
-    text = page(Path(snakemake.input.template), tables)
-    path.write_text(text, encoding="utf-8")
+for (name, tables), template in zip(PAGES.items(), snakemake.input.templates, strict=True):
+    collect(campaign, docs / name, found, tables)
+    with atomic(docs / f"{name}.md") as path:
+        path.write_text(page(Path(template), docs / name), encoding="utf-8")
