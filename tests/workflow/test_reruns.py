@@ -34,11 +34,19 @@ STEADY_TABLE = {
     "figure_voronoi_variance": 1,
 }
 SPECTRA = {"figure_phase_and_spectra": 1, "figure_cloud_spectra": 1}
-CELLS = {"voronoi_cells": 7, "figure_voronoi_pdf": 1}
+CELLS = {"voronoi_cells": 8, "figure_voronoi_pdf": 1, "figure_closures": 1}
+LASTING = {"figure_lifetimes": 1, "local_volume_fraction": 1}
+TOGETHER = {
+    "all_particles": 3,
+    "voronoi_cells": 1,
+    "figure_closures": 1,
+    "figure_trajectories_all_particles": 1,
+}
 STEADY = {
     "neighbour_changes": 1,
     "figure_ergodicity": 1,
     **CELLS,
+    **LASTING,
     **SPECTRA,
     **STEADY_TABLE,
 }
@@ -60,7 +68,7 @@ SHORT = {
     "neighbour_changes": 1,
     "figure_phase_and_spectra": 1,
     **CELLS,
-    "voronoi_cells": 4,
+    "voronoi_cells": 6,
     **STEADY_TABLE,
 }
 TABLES = {
@@ -133,7 +141,10 @@ def changed_themselves(words: str) -> set[str]:
             "idnn={learning_curve: [40, 60, 80]}",
             {"trial": 2, "learning_curve": 1, "figure_learning_curve": 1},
         ),
-        ("sedimentation={step: 0.05}", SHORT | PATHS | {"sedimentation": 7, "all_particles": 3}),
+        (
+            "sedimentation={step: 0.05}",
+            SHORT | PATHS | TOGETHER | {"sedimentation": 7, "voronoi_cells": 6},
+        ),
         (
             "sedimentation={long: {duration: 5}}",
             {
@@ -144,11 +155,12 @@ def changed_themselves(words: str) -> set[str]:
                 "figure_ergodicity": 1,
                 "figure_cloud_spectra": 1,
             }
+            | LASTING
             | STEADY_TABLE,
         ),
         (
             "sedimentation={all_particles: {fluid: quasi_steady}}",
-            {"all_particles": 3} | STEADY_TABLE,
+            TOGETHER | STEADY_TABLE,
         ),
         (
             "sedimentation={galileo: {multiples: [1, 2, 3]}}",
@@ -192,9 +204,18 @@ def test_an_edited_key_reruns_what_depends_on_it_and_nothing_else(rehearsal, set
         ("stokes/records.py", {"stokes": 5} | AUDIT | FROM_DATA),
         ("dataset.py", AUDIT | FROM_DATA),
         ("training/fit.py", MODELS | SETTLING),
-        ("sedimentation/settle.py", ALL_SETTLING | {"all_particles": 3}),
-        ("suspension/ewald.py", {"all_particles": 3} | STEADY_TABLE),
-        ("analysis/voronoi.py", {"random_spheres": 1, **CELLS, "figure_voronoi_variance": 1}),
+        ("sedimentation/settle.py", ALL_SETTLING | TOGETHER | {"voronoi_cells": 9}),
+        ("suspension/ewald.py", TOGETHER | STEADY_TABLE),
+        (
+            "analysis/voronoi.py",
+            {
+                "random_spheres": 1,
+                **CELLS,
+                "voronoi_cells": 9,
+                "figure_voronoi_variance": 1,
+                "figure_lifetimes": 1,
+            },
+        ),
         ("figures/mesh.py", {"figure_mesh_study": 1}),
         ("progress.py", {}),
     ],
