@@ -10,11 +10,8 @@ from dustfall.dataset import OWN_LAW
 from dustfall.forces.features import KINDS
 from dustfall.forces.registry import settling_models, trained_models
 from dustfall.own_data import shape
-from dustfall.sedimentation import AllParticles, Properties
-
-ALL_PARTICLES, BACK_FLOW = AllParticles.name, "back_flow"
-"""What cases are called in which every particle feels all others, not its nearest neighbours, and
-those in which the fluid flows back between nearest neighbours."""
+from dustfall.sedimentation.closures.names import ALL_PARTICLES, BACK_FLOW
+from dustfall.sedimentation.properties import Properties
 
 
 class Case(NamedTuple):

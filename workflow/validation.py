@@ -29,12 +29,12 @@ from dustfall.analysis.references import (
 from dustfall.benchmarks.solver import MULTIPOLE
 from dustfall.figures.style import CLOSURES, model_title
 from dustfall.scenes import LAWS
-from dustfall.sedimentation.closures import AllParticles, BackFlow
-from dustfall.sedimentation.closures.back_flow import BATCHELOR_COEFFICIENT
+from dustfall.sedimentation.closures.names import ALL_PARTICLES, BACK_FLOW
 from dustfall.sedimentation.properties import Properties
 from dustfall.sedimentation.state import box_length
 from dustfall.stokes import Status, fixed_spheres
 from dustfall.stokes.references.exact_pairs import forces_on_two_spheres
+from dustfall.suspension.batchelor import BATCHELOR_COEFFICIENT
 from dustfall.units import COMPONENTS, RADIUS, SPHERE_VOLUME, STOKES_DRAG
 from workflow.library import ROOT
 from workflow.pages import read_tables, render
@@ -378,7 +378,7 @@ def models(steady: pd.DataFrame, configuration: dict) -> pd.DataFrame:
 
 def all_particles(steady: pd.DataFrame) -> pd.DataFrame:
     """Clouds of which all particles feel each other: one row a phi and number of particles."""
-    own = steady[steady["model"] == AllParticles.name]
+    own = steady[steady["model"] == ALL_PARTICLES]
     if own.empty:
         return own
     velocity = own[own["quantity"] == "settling_velocity_mean"]
@@ -419,7 +419,7 @@ def closures(figure: pd.DataFrame) -> pd.DataFrame:
 def back_flow(steady: pd.DataFrame) -> pd.DataFrame:
     """Nearest neighbours without and with back-flow: one row a phi, of the clouds that ran both."""
     velocity = steady[steady["quantity"] == "settling_velocity_mean"]
-    own = velocity[velocity["model"] == BackFlow.name]
+    own = velocity[velocity["model"] == BACK_FLOW]
     if own.empty:
         return own
     model = velocity.loc[~velocity["model"].isin(CLOSURES), "model"].value_counts().index[0]

@@ -6,11 +6,11 @@ from scipy import stats
 from scipy.spatial import cKDTree
 
 from dustfall.forces.formulas import FORMULAS
-from dustfall.sedimentation.closures.back_flow import BATCHELOR_COEFFICIENT
 from dustfall.sedimentation.neighbours import nearest_neighbours
 from dustfall.sedimentation.start import random_positions
 from dustfall.sedimentation.state import box_length
 from dustfall.streams import Purpose, stream
+from dustfall.suspension.batchelor import BATCHELOR_COEFFICIENT
 from dustfall.suspension.periodic import HASIMOTO, periodic_mobility
 from dustfall.suspension.rotne_prager import rotne_prager_forces
 from dustfall.units import AXES, RADIUS, STOKES_DRAG

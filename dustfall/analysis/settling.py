@@ -16,8 +16,8 @@ from dustfall.analysis.time_averages import (
     mean_of_runs,
     mean_with_interval,
 )
-from dustfall.sedimentation.closures.back_flow import BATCHELOR_COEFFICIENT
 from dustfall.sedimentation.properties import mean_spacing
+from dustfall.suspension.batchelor import BATCHELOR_COEFFICIENT
 
 CASE = ("model", "n", "volume_fraction", "galileo")
 """Attributes that tell one case from another; runs that share them differ by their seed."""

@@ -14,7 +14,7 @@ from matplotlib.ticker import FuncFormatter
 from dustfall.files import atomic
 from dustfall.forces import registry
 from dustfall.forces.formulas import FORMULAS
-from dustfall.sedimentation.closures import AllParticles, BackFlow
+from dustfall.sedimentation.closures.names import ALL_PARTICLES, BACK_FLOW
 
 STYLE: dict = {
     "font.family": "STIXGeneral",
@@ -97,8 +97,8 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 CLOSURES = {
-    AllParticles.name: ("all particles together", {"color": "black", "marker": MARKERS[-1]}),
-    BackFlow.name: ("nearest neighbours and back-flow", {"color": "#aa4499", "marker": "h"}),
+    ALL_PARTICLES: ("all particles together", {"color": "black", "marker": MARKERS[-1]}),
+    BACK_FLOW: ("nearest neighbours and back-flow", {"color": "#aa4499", "marker": "h"}),
 }
 """Title and look of what stands in place of a force model where a closure is compared."""
 

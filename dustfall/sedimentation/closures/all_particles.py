@@ -20,6 +20,7 @@ from typing import ClassVar
 import numpy as np
 
 from dustfall.columns import Column
+from dustfall.sedimentation.closures.names import ALL_PARTICLES
 from dustfall.sedimentation.properties import Properties
 from dustfall.sedimentation.state import Closure, Drag, State
 from dustfall.suspension import PeriodicMobility
@@ -79,7 +80,7 @@ class AllParticles(Closure):
     ValueError : another fluid, or a time that is not positive.
     """
 
-    name = "all_particles"
+    name = ALL_PARTICLES
     step: float
     series: ClassVar = {
         "products": Column("1", "products with the mobility that the step took"),

@@ -16,6 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from dustfall.sedimentation.closures.names import BACK_FLOW
 from dustfall.sedimentation.closures.nearest_neighbours import (
     UP,
     NearestNeighbours,
@@ -25,9 +26,7 @@ from dustfall.sedimentation.neighbours import nearest_neighbours
 from dustfall.sedimentation.start import random_positions
 from dustfall.sedimentation.state import Drag, State, box_length
 from dustfall.streams import Purpose, stream
-
-BATCHELOR_COEFFICIENT = -6.55
-"""Settling velocity of a dilute random suspension is 1 + this times phi (Batchelor 1972)."""
+from dustfall.suspension.batchelor import BATCHELOR_COEFFICIENT
 
 SURROUNDINGS = 30_000
 """Random surroundings that the mean is taken over: at phi = 1e-3 its standard error is 0.001."""
@@ -47,7 +46,7 @@ class BackFlow(NearestNeighbours):
         reach.
     """
 
-    name = "back_flow"
+    name = BACK_FLOW
 
     def __init__(
         self, model, volume_fraction: float, neighbours: int | None = None, threads: int = 1

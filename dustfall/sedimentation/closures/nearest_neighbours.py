@@ -11,6 +11,7 @@ from dustfall.columns import Column
 from dustfall.forces.frames import MOST_NEIGHBOURS, rotation_to_streamwise
 from dustfall.sedimentation.blocks import Blocks
 from dustfall.sedimentation.closures.contacts import changed_neighbours, contacts
+from dustfall.sedimentation.closures.names import NEAREST_NEIGHBOURS
 from dustfall.sedimentation.neighbour_list import NeighbourList
 from dustfall.sedimentation.state import Closure, Drag, State
 from dustfall.streams import Purpose, stream
@@ -44,7 +45,7 @@ class NearestNeighbours(Closure):
     ValueError : k is not from 1 to 50, or not the number that the model takes.
     """
 
-    name = "nearest_neighbours"
+    name = NEAREST_NEIGHBOURS
     series: ClassVar = {
         "inverse_beta_mean": Column("1", "mean over particles of 1/beta, beta = F'_y / 24"),
         "beta_mean": Column("1", "mean over particles of beta = F'_y / 24"),
