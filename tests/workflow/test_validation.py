@@ -127,7 +127,8 @@ def test_all_that_the_page_is_made_from_is_made_by_the_campaign_or_named_by_its_
     }  # fmt: skip
     rule = (ROOT / "workflow/rules/validation.smk").read_text(encoding="utf-8")
     further = set(re.findall(r'"(results/[^"]*)"', rule))
-    needed = {path for _, sources in validation.TABLES.values() for path in sources}
+    pages = validation.PAGES.values()
+    needed = {path for page in pages for _, sources in page.values() for path in sources}
     assert {path for path in needed if path.startswith("results/")} - made == further
     # A picture comes with the numbers that it draws.
     beside = {str(Path(path).with_suffix(".csv")) for path in validation.PICTURES.values()}
