@@ -160,13 +160,15 @@ def test_further_seeds_leave_the_names_of_the_first_as_they_are():
 
 def test_each_number_of_particles_has_its_number_of_seeds_the_last_for_all_that_follow():
     settle = PLAIN | {
-        "particles": [15, 20, 30],
+        "particles": [150, 200, 300],
         "seeds": [3, 2],
         "galileo": {"particles": 500},
     }
     cases = plan.cases(configure({"sedimentation": settle})).values()
-    seeds = {n: max(case.seed for case in cases if case.particles == n) for n in (15, 20, 30, 500)}
-    assert seeds == {15: 3, 20: 2, 30: 2, 500: 1}
+    seeds = {
+        n: max(case.seed for case in cases if case.particles == n) for n in (150, 200, 300, 500)
+    }
+    assert seeds == {150: 3, 200: 2, 300: 2, 500: 1}
 
 
 def test_start_file_may_be_one_for_each_case():

@@ -20,9 +20,9 @@ def library(script):
     return digest(library_files(ROOT / "workflow" / "scripts" / script))
 
 
-def settling_library(model):
+def settling_library(model, script="settle.py"):
     """Digest of the library files that settling with a force model runs: with its formula's."""
-    files = library_files(ROOT / "workflow" / "scripts" / "settle.py")
+    files = library_files(ROOT / "workflow" / "scripts" / script)
     if model not in LEARNED_MODELS:
         formula = f"dustfall/forces/formulas/{model}.py"
         files = sorted({*files, formula, *library_files(ROOT / formula)})

@@ -4,7 +4,6 @@ import joblog
 from dustfall.forces.formula import load_formula
 from dustfall.forces.learned import load_model
 from dustfall.sedimentation.closures.back_flow import BackFlow
-from dustfall.sedimentation.closures.moving_neighbours import MovingNeighbours
 from dustfall.sedimentation.closures.nearest_neighbours import NearestNeighbours
 from settling import properties_of, settle_case
 
@@ -12,11 +11,8 @@ progress = joblog.start(snakemake)
 learned, params = snakemake.input.model, snakemake.params
 model = load_model(learned) if learned else load_formula(params.model)
 number, threads = params.get("neighbours"), snakemake.threads
-properties = properties_of(params)
 if params.get("back_flow"):
     closure = BackFlow(model, params.volume_fraction, number, threads)
-elif params.get("moving"):
-    closure = MovingNeighbours(properties, params.schedule["step"], number, threads)
 else:
     closure = NearestNeighbours(model, number, threads)
-settle_case(snakemake, closure, properties, progress)
+settle_case(snakemake, closure, properties_of(params), progress)
