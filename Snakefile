@@ -141,6 +141,8 @@ rule configuration:
 
 rule verify:
     """Compare every file in results/ with the checksum that its job wrote."""
+    log:
+        "logs/verify.log",
     localrule: True
     script:
         "workflow/scripts/verify.py"

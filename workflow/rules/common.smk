@@ -1,5 +1,5 @@
-# What the rule files share. Rules whose jobs take seconds are local: where the others go to a cluster
-# they run beside Snakemake.
+# What the files of rules share. Jobs of seconds are local: where others go to a cluster they run
+# beside Snakemake.
 
 
 wildcard_constraints:
@@ -64,10 +64,9 @@ TITLES = {
     "openfoam_settling": ("In time", "OpenFOAM and dustfall"),
     "local_volume_fraction": ("Clustering", "Volume fraction around the particles"),
     "closures": ("Comparison", "Five neighbours and all particles"),
-    "trajectories_all_particles": ("Paths", "Paths of three particles"),
+    "trajectories_all_particles": ("In time", "Paths where all particles feel each other"),
     "voronoi_pdf": ("Clustering", "Densities of Voronoi volumes"),
     "voronoi_variance": ("Clustering", "Variance of Voronoi volumes"),
-    "lifetimes": ("Clustering", "Lifetimes of clusters"),
 }
 
 

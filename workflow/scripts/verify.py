@@ -1,14 +1,18 @@
 """Compare every file in results/ with the checksum that its job wrote."""
 
 import sys
+from pathlib import Path
 
 from workflow import checksums
 
-files = complaints = 0
-for _, complaint in checksums.verify():
-    files += 1
-    if complaint:
-        complaints += 1
-        print(complaint)
-print(f"{files} files in {checksums.RESULTS}/, {files - complaints} of them whole")
-sys.exit(min(complaints, 1))
+found = list(checksums.verify())
+complaints = [complaint for _, complaint in found if complaint]
+words = [
+    *complaints,
+    f"{len(found)} files in {checksums.RESULTS}/, {len(found) - len(complaints)} of them whole",
+]
+log = Path(snakemake.log[0])
+log.parent.mkdir(parents=True, exist_ok=True)
+log.write_text("\n".join(words) + "\n", encoding="utf-8")
+print(*words, sep="\n")
+sys.exit(bool(complaints))
