@@ -55,6 +55,24 @@ rule moving_benchmark:
         "../scripts/moving_benchmark.py"
 
 
+rule settling_benchmark:
+    """Seconds a step and memory of clouds, by their number of particles."""
+    output:
+        "results/benchmarks/settling.csv",
+    log:
+        "logs/benchmarks/settling.log",
+    # Not for the scheduler alone: what is timed on two threads has two cores.
+    threads: max(config["benchmarks"]["threads"])
+    params:
+        library=library("settling_benchmark.py"),
+        seed=config["seed"],
+        particles=config["benchmarks"]["particles"],
+        volume_fraction=config["benchmarks"]["volume_fraction"],
+        threads=config["benchmarks"]["threads"],
+    script:
+        "../scripts/settling_benchmark.py"
+
+
 rule stress:
     """Gaps, distances, turns and condition numbers that strain the solver."""
     output:

@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from workflow import checksums
+from workflow import checksums, stops
 
 found = list(checksums.verify())
 complaints = [complaint for _, complaint in found if complaint]
@@ -15,4 +15,6 @@ log = Path(snakemake.log[0])
 log.parent.mkdir(parents=True, exist_ok=True)
 log.write_text("\n".join(words) + "\n", encoding="utf-8")
 print(*words, sep="\n")
+if complaints:
+    stops.note(f"{len(complaints)} of {len(found)} files are not what their jobs wrote")
 sys.exit(bool(complaints))
