@@ -37,7 +37,7 @@ from dustfall.stokes.references.exact_pairs import forces_on_two_spheres
 from dustfall.suspension.batchelor import BATCHELOR_COEFFICIENT
 from dustfall.units import COMPONENTS, RADIUS, SPHERE_VOLUME, STOKES_DRAG
 from workflow.library import ROOT
-from workflow.pages import read_tables, render
+from workflow.pages import read_tables, render, wide
 
 CONFIGURATION = "results/config.yaml"
 
@@ -416,6 +416,14 @@ def closures(figure: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows).sort_values(["model", "n"], ignore_index=True)
 
 
+def settling_cost(steps: pd.DataFrame) -> pd.DataFrame:
+    """What steps cost, one row a number of particles: columns <quantity>_<closure>_<threads>."""
+    case = steps["closure"] + "_" + steps["threads"].astype(str)
+    columns = ["particles", "seconds", "products", "exponent"]
+    memory = steps.groupby("particles", as_index=False)["memory"].max()
+    return wide(steps[columns].assign(case=case), "particles", "case").merge(memory)
+
+
 def back_flow(steady: pd.DataFrame) -> pd.DataFrame:
     """Nearest neighbours without and with back-flow: one row a phi, of the clouds that ran both."""
     velocity = steady[steady["quantity"] == "settling_velocity_mean"]
@@ -472,13 +480,11 @@ def fluctuations(spectra: pd.DataFrame, ergodicity: pd.DataFrame) -> pd.DataFram
     """Slopes of the spectra and spread of time averages of the largest clouds: one row a phi."""
     slopes = spectra.drop_duplicates(["method", "volume_fraction"])
     half = (slopes["slope_high"] - slopes["slope_low"]) / 2
-    wide = slopes.assign(half=half).pivot(
-        index="volume_fraction", columns="method", values=["slope", "half"]
-    )
-    wide.columns = [f"{name}_{method}" for name, method in wide.columns]
+    columns = ["volume_fraction", "method", "slope", "half"]
+    slopes = wide(slopes.assign(half=half)[columns], "volume_fraction", "method")
     longest = ergodicity.sort_values("window").drop_duplicates("volume_fraction", keep="last")
     longest = longest[["volume_fraction", "n", "window", "spread"]]
-    return wide.reset_index().merge(longest, on="volume_fraction")
+    return slopes.merge(longest, on="volume_fraction")
 
 
 def voronoi(figure: pd.DataFrame) -> pd.DataFrame:
@@ -619,6 +625,7 @@ CLOSURE_TABLES: dict[str, tuple[Callable[..., pd.DataFrame], tuple[str, ...]]] =
     "back_flow": (back_flow, (STEADY_STATE,)),
     "all_particles": (all_particles, (STEADY_STATE,)),
     "moving_spheres": (pd.DataFrame, ("results/studies/moving_spheres.csv",)),
+    "settling_cost": (settling_cost, ("results/benchmarks/settling.csv",)),
 }
 """The same of the page of all particles."""
 

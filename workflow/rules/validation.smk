@@ -3,6 +3,7 @@
 
 # Parts that a campaign may have or not: what is missing here has no section in the page.
 FURTHER = [
+    "results/benchmarks/settling.csv",
     "results/benchmarks/solver.csv",
     "results/benchmarks/spheres.csv",
     "results/benchmarks/stress.csv",
