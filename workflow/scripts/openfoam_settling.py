@@ -25,6 +25,7 @@ if shutil.which("icoUncoupledKinematicParcelFoam") is None or not PLUGIN.exists(
 properties, model = Properties(**params.properties), load_model()
 start = random_start(params.particles, params.volume_fraction, params.seed, params.stream, "stokes")
 steps = round(params.duration / params.step)
+every = max(1, steps // FRAMES)
 
 
 def row(program: str, time: float, position, velocity) -> dict:
@@ -43,13 +44,13 @@ rows = [row("dustfall", 0.0, start.position, start.velocity)]
 state, closure, report = start, NearestNeighbours(model), progress("dustfall", "steps")
 for number in range(1, steps + 1):
     state = step(state, closure, params.step, properties.stokes_number)
-    rows.append(row("dustfall", number * params.step, state.position, state.velocity))
+    if number % every == 0:
+        rows.append(row("dustfall", number * params.step, state.position, state.velocity))
     report(number, steps)
 
 rows.append({**rows[0], "program": "OpenFOAM"})
 with tempfile.TemporaryDirectory() as folder:
     case = Path(folder, "case")
-    every = max(1, steps // FRAMES)
     make_case(case, start, params.step, params.duration, every, model, properties=properties)
     subprocess.run([case / "Allrun"], check=True)
     for frame in read_frames(case, properties):
