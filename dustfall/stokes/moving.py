@@ -310,6 +310,7 @@ def _solved(scene, amplified, response, right, measured, units, scale) -> tuple:
             ]
             unsolved = np.sqrt(n) * residual * condition
             estimate = SAFETY * np.max(change, axis=0) + (plan.left_out + unsolved) * scale
+            estimate += plan.unresolved * own
             estimate /= own
             if residual > goal or estimate.max() <= scene.tolerance:
                 break

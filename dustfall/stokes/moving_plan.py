@@ -28,13 +28,15 @@ class MovingPlan:
 
     degrees: (n, n), symmetric, zero on the diagonal. close: (n, n), whether a pair's degrees beyond
     are eliminated. eliminated: (n, n), up to which, on sphere i of the pair i, j. left_out: (n,)
-    what each sphere lacks by the rule.
+    what each sphere lacks by the rule. unresolved: (n,), what it lacks where MOST_ELIMINATED ends
+    the degrees of a close pair, over its own load, which lubrication makes large.
     """
 
     degrees: np.ndarray
     close: np.ndarray
     eliminated: np.ndarray
     left_out: np.ndarray
+    unresolved: np.ndarray
 
 
 def plan_moving(
@@ -55,7 +57,9 @@ def plan_moving(
     alone = np.exp(2.0 * np.minimum(LONE_DIGITS - eliminated * np.where(close, xi, 0.0), 0.0))
     alone = np.where(close, np.maximum(alone, alone.T), 0.0)
     left_out = np.sqrt(left_out**2 + np.sum(alone**2, axis=1))
-    return MovingPlan(degrees, close, eliminated, left_out)
+    ended = np.where(eliminated >= MOST_ELIMINATED, alone, 0.0)
+    unresolved = np.sqrt(np.sum(np.maximum(ended, ended.T) ** 2, axis=1))
+    return MovingPlan(degrees, close, eliminated, left_out, unresolved)
 
 
 def slopes(distance, radii) -> np.ndarray:

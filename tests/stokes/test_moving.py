@@ -297,3 +297,12 @@ def test_memory_that_is_not_there_is_not_taken(monkeypatch):
 def test_a_million_spheres_are_refused_before_their_distances_are_taken():
     with pytest.raises(MemoryError, match="1000000 spheres take"):
         mobility(np.zeros((1_000_000, 3)), np.zeros((1_000_000, 3)))
+
+
+def test_a_gap_beyond_the_last_degree_is_no_convergence():
+    # Approach: 1 / (2 gap) + 9/20 log(1 / gap) + 1.346, the gap in radii (Kim and Karrila 1991).
+    gap = 1e-7
+    found = resistance([[0, 0, 0], [0, 0, 1 + gap]], [[0, 0, 1], [0, 0, -1]], tolerance=1e-4)
+    exact = 0.25 / gap - 0.45 * np.log(2 * gap) + 1.346
+    assert abs(found.force[1, 2] - exact) <= found.error_estimate[1] * found.scale[1]
+    assert found.status == Status.OUT_OF_REACH
