@@ -27,7 +27,7 @@ SOLVE_SECONDS = {"multipole": 2e-3, "elements": 1.0, "paper": 10.0}
 NETWORK_SECONDS = 5e-10
 """One multiplication by a weight, for one scene in one epoch, with its share of all else."""
 
-STEP_SECONDS = {"neighbours": 2.5e-6, "all particles": 2.5e-5}
+STEP_SECONDS = {"neighbours": 2.5e-6, "all particles": 1.0e-5}
 """One particle in one step."""
 
 SCENE_BYTES = 1500

@@ -263,12 +263,12 @@ def compared_closures(config: dict) -> list[str]:
 
     Those of the campaign's model and those of all particles, which last equally long.
     """
-    settle = config["sedimentation"]
-    densest = max(settle["volume_fractions"])
-    together = settle["all_particles"]["particles"]
+    densest = max(config["sedimentation"]["volume_fractions"])
     return [
-        *(Case(n, densest, 1.0).name for n in settle["particles"]),
-        *(Case(n, densest, 1.0, compared=ALL_PARTICLES).name for n in together),
+        name
+        for closure in ("", ALL_PARTICLES)
+        for name, case in cases(config).items()
+        if case == Case(case.particles, densest, 1.0, compared=closure)
     ]
 
 

@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 
 from dustfall.dataset import read
 from dustfall.forces import load_model
@@ -39,8 +40,9 @@ def test_nothing_is_drawn_or_solved_and_all_else_is_planned(own):
 
 
 @pytest.mark.slow
-def test_models_of_ten_neighbours_are_swept_trained_and_drawn(own):
-    own.run(*SMALL, "--", "results/model/idnn.safetensors", "results/figures/spearman.png")
+def test_models_of_ten_neighbours_are_swept_trained_and_drawn_and_settle_a_cloud(own):
+    cloud = "results/sedimentation/n100_phi1e-03_ga1.series.nc"
+    own.run(*SMALL, "--", cloud, "results/figures/spearman.png")
     results = own.folder / "results"
     dataset = read(results / "dataset/forces.h5")
     table = pd.read_csv(own.folder / "fixed_array.csv")
@@ -48,6 +50,10 @@ def test_models_of_ten_neighbours_are_swept_trained_and_drawn(own):
     model = load_model(results / "model/idnn.safetensors")
     assert model.neighbours == 10
     assert model.predict(dataset.neighbours).shape == dataset.force.shape
+    with xr.open_dataset(own.folder / cloud) as series:
+        assert series.attrs["model"] == "idnn"
+        assert series.attrs["neighbours"] == 10
+        assert np.isfinite(series["settling_velocity_mean"]).all()
 
 
 def test_files_that_do_not_fit_are_refused_with_a_sentence(own):

@@ -70,14 +70,14 @@ def test_the_paper_takes_the_expected_jobs_and_fewer_than_a_thousand(project):
         # the fewest from 3 starts, and of what is compared: three closed formulas, the anchored
         # IDNN and the back-flow.
         "sedimentation": 2 * 6 + 3 + (3 + 1) * 6 + (4 + 1) * 6,
-        "all_particles": 2 * 6,
+        "all_particles": 3 * 6,
         "steady_state": 1,
         "independence_of_n": 1,
         "neighbour_changes": 1,
         "mesh_study": 1,
         "movie": 1,
         # The long cases and the Galileo numbers; the densest, five neighbours and all together.
-        "voronoi_cells": (3 + 1) * 6 + 3 + 2 + 2,
+        "voronoi_cells": (3 + 1) * 6 + 3 + 2 + 3,
         "local_volume_fraction": 1,
         "random_spheres": 1,
         "tables": 1,
