@@ -74,7 +74,8 @@ def inverse_beta(frame: pd.DataFrame) -> Figure:
     shown = frame[frame["source"] != "Del Bello 2017"]
     low, high = shown[["value", "low"]].min(axis=None), shown[["value", "high"]].max(axis=None)
     room = ROOM * (high - low) or ROOM
-    right.set_ylim(low - room, high + room)
+    # The legend of all models lies above the curves where they are low.
+    right.set_ylim(low - room, high + 5 * room)
     principal = simulation["model"].value_counts().index[0]
     for i, (n, rows) in enumerate(simulation[simulation["model"] == principal].groupby("n")):
         look = model_look(principal) | {"marker": MARKERS[i % len(MARKERS)]}
@@ -202,8 +203,7 @@ def settling_in_time(frame: pd.DataFrame) -> Figure:
     `analysis.settling.settling_in_time` gives for one model, and window ("as the paper" or "until
     steady"); one column of panels for each window and n, the first in response times, the second
     in spreading times. The change is that of the mean since `ADAPTED`, in a shorter run since half
-    of it, in the second window since the first step. Raises ValueError for a missing column,
-    several models or fewer than two rows.
+    of it. Raises ValueError for a missing column, several models or fewer than two rows.
     """
     columns = ["model", "n", "volume_fraction", "time", "spreading_times", "mean", "variance"]
     require(frame, [*columns, "window"], "settling_in_time", fewest=2)
@@ -218,13 +218,12 @@ def settling_in_time(frame: pd.DataFrame) -> Figure:
         mean, change, variance = axes[:, column]
         paper = window == WINDOWS[0]
         clock = "time" if paper else "spreading_times"
-        since = min(ADAPTED, cases["time"].max() / 2) if paper else 0.0
         for phi, rows in cases.groupby("volume_fraction"):
             rows = rows.sort_values("time")
             colour = phi_colour(phi)
             mean.plot(rows[clock], rows["mean"], color=colour, lw=1)
-            # A start at rest has not settled yet.
-            later = rows[(rows[clock] >= since) & (rows["mean"] > 0)]
+            # Before that particles still follow their start and not the cloud.
+            later = rows[rows["time"] >= min(ADAPTED, rows["time"].max() / 2)]
             if not later.empty:
                 gained = 100 * (later["mean"] / later["mean"].iloc[0] - 1)
                 change.plot(later[clock], gained, color=colour, lw=1)
@@ -233,14 +232,14 @@ def settling_in_time(frame: pd.DataFrame) -> Figure:
             variance.plot(rows[clock], positive, color=colour, lw=1)
         mean.axhline(1, color=REFERENCE, lw=0.6, zorder=0)
         change.axhline(0, color=REFERENCE, lw=0.6, zorder=0)
-        mean.set_title(f"{number_label(n)}, {window}", fontsize=8)
+        mean.set_title(f"{number_label(n)}, {window}", fontsize=7, loc="right")
         log_scale(variance, "y")
         variance.set_xlabel(r"time $t/\tau$" if paper else "time [spreading times]")
     positive = frame["variance"][frame["variance"] > 0]
     if not positive.empty:
         axes[2, 0].set_ylim(0.5 * positive.quantile(0.01), 2 * positive.max())
     axes[0, 0].set_ylabel(r"mean $\langle v_s\rangle^{p} / v_{s,\mathrm{Stokes}}$")
-    axes[1, 0].set_ylabel(f"change of the mean [%]\n(since ${ADAPTED:g}\\,\\tau$; first step)")
+    axes[1, 0].set_ylabel(f"change of the mean\nsince ${ADAPTED:g}\\,\\tau$ [%]")
     axes[2, 0].set_ylabel(r"variance $\mathrm{var}^{p}(v_s) / v_{s,\mathrm{Stokes}}^2$")
     letter(axes[:, 0])
     phi_legend(figure, frame["volume_fraction"])

@@ -12,7 +12,7 @@ from dustfall.analysis.evaluation import error_by_gap
 from dustfall.analysis.mesh_study import mesh_study_table
 from dustfall.analysis.settling import inverse_beta_table
 from dustfall.figures.closures import PANELS
-from dustfall.figures.settling import WINDOWS
+from dustfall.figures.settling import ADAPTED, WINDOWS
 from dustfall.figures.style import (
     PHI_RANGE,
     STYLE,
@@ -355,6 +355,10 @@ def test_panels_with_two_views_draw_both():
     for window, clock in zip(WINDOWS, ("time", "spreading_times"), strict=True):
         own, positive = (t[t["window"] == window] for t in (table, moving))
         assert pairs(own, clock, "mean") | pairs(positive, clock, "variance") <= drawn
+        for _, case in own.groupby(["volume_fraction", "n"]):
+            later = case[case["time"] >= min(ADAPTED, case["time"].max() / 2)]
+            change = 100 * (later["mean"] / later["mean"].iloc[0] - 1)
+            assert pairs(later.assign(change=change), clock, "change") <= drawn
     table = phase_and_spectra()
     drawn = drawn_points(figures.phase_and_spectra(table))
     assert pairs(table[table["panel"] != "phase"], "x", "y") <= drawn
