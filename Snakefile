@@ -117,6 +117,7 @@ rule studies:
     input:
         "results/studies/step_size.csv",
         "results/studies/neighbour_numbers.csv",
+        "results/figures/neighbour_numbers.png",
         "results/studies/moving_neighbours.csv",
         "results/studies/moving_spheres.csv",
 

@@ -55,6 +55,7 @@ PICTURES = {
             "inverse_beta",
             "learning_curve",
             "mesh_study",
+            "neighbour_numbers",
             "predicted_vs_target",
             "scene_meshes",
             "trajectories",

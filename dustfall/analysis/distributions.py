@@ -8,7 +8,7 @@ from dustfall.analysis.references import PAPER_FORCE_SUMMARY
 from dustfall.units import AXES, COMPONENTS, STOKES_DRAG
 
 FEWEST_SAMPLES = 5
-"""A decade with fewer samples than this has no density worth drawing."""
+"""A decade or a slice with fewer samples than this has no density worth drawing."""
 
 LAWS = {"laplace": (stats.laplace, 0.93), "normal": (stats.norm, 0.895)}
 """Laws that are fitted to samples, and their Kolmogorov-Smirnov levels: a law fitted to m of its
@@ -23,6 +23,10 @@ range of a normal law over its deviation (Silverman 1986, Eqs. 3.30 and 3.31).""
 
 KERNEL_REACH = 3
 """Kernel widths that a density is drawn beyond the outermost samples."""
+
+NEAREST = 10
+"""A kernel is as wide as the distance of this nearest sample at least: those that fit the peak of a
+dilute slice would leave its long tails in pieces."""
 
 
 def force_samples(volume_fraction, force, number=1000) -> pd.DataFrame:
@@ -55,30 +59,33 @@ def force_samples(volume_fraction, force, number=1000) -> pd.DataFrame:
 
 
 def force_distributions(volume_fraction, force, points=400) -> pd.DataFrame:
-    """Estimate the p.d.f. of each force component in each decade of the volume fraction.
+    """Estimate the p.d.f. of each force component in a slice about each power of ten of phi.
 
-    Parameters: `volume_fraction` (m,), `force` (m, 3) in Re_p c_D, `points` a curve. Gaussian
-    kernels of Silverman's robust width. Neighbours lower the drag: where no sample exceeds Stokes
-    drag, the streamwise density ends there, and what kernels put beyond is folded back (reflection,
-    Silverman 1986, section 2.10). Decades with fewer than `FEWEST_SAMPLES` samples are left out.
+    Parameters: `volume_fraction` (m,), `force` (m, 3) in Re_p c_D, `points` a curve, half of them
+    at equal shares of the samples and half at equal distances. Gaussian kernels of Silverman's
+    robust width, wider where forces are rare (variable kernels, Silverman 1986, section 2.6).
+    Neighbours lower the drag: where no sample exceeds Stokes drag, the streamwise density ends
+    there, and what kernels put beyond is folded back (reflection, section 2.10). Slices with fewer
+    than `FEWEST_SAMPLES` samples are left out.
 
-    Returns the columns component, phi_low, phi_high, samples, force, density [1/(Re_p c_D)], and
-    for the lateral components laplace_density, the Laplace law fitted to both of them, with its
-    Kolmogorov-Smirnov distance laplace_ks and laplace_ks_level, which the fitted law of as many
-    independent samples exceeds in one case of twenty.
+    Returns the columns component, slice (the power of ten), phi_low, phi_high, samples, force,
+    density [1/(Re_p c_D)], and for the lateral components laplace_density, the Laplace law fitted
+    to both of them, with its Kolmogorov-Smirnov distance laplace_ks and laplace_ks_level, which the
+    fitted law of as many independent samples exceeds in one case of twenty.
 
-    Raises ValueError for bad arrays, or where no decade has samples enough.
+    Raises ValueError for bad arrays, or where no slice has samples enough.
     """
     volume_fraction, force = check_forces(volume_fraction, force)
     tables = []
-    for low, high, inside in decades(volume_fraction):
+    for exponent, inside in slices(volume_fraction):
         if inside.sum() < FEWEST_SAMPLES:
             continue
+        own = volume_fraction[inside]
         law = fit("laplace", force[inside][:, COMPONENTS["lateral"]])
         for component, column in AXES.items():
             values = force[inside, column]
-            curve = {"component": component, "phi_low": low, "phi_high": high}
-            curve |= {"samples": len(values)}
+            curve = {"component": component, "slice": 10.0**exponent}
+            curve |= {"phi_low": own.min(), "phi_high": own.max(), "samples": len(values)}
             if column in COMPONENTS["lateral"]:
                 x, density = _kernel_density(values, points)
                 curve |= {
@@ -91,10 +98,10 @@ def force_distributions(volume_fraction, force, points=400) -> pd.DataFrame:
             tables.append(pd.DataFrame(curve | {"force": x, "density": density}))
     if not tables:
         raise ValueError(
-            f"no decade of the volume fraction has {FEWEST_SAMPLES} samples; "
+            f"no slice of the volume fraction has {FEWEST_SAMPLES} samples; "
             f"there are {len(volume_fraction)} in all"
         )
-    columns = ["component", "phi_low", "phi_high", "samples", "force", "density"]
+    columns = ["component", "slice", "phi_low", "phi_high", "samples", "force", "density"]
     columns += ["laplace_density", "laplace_ks", "laplace_ks_level"]
     return pd.concat(tables, ignore_index=True)[columns]
 
@@ -195,6 +202,16 @@ def decades(volume_fraction: np.ndarray) -> list[tuple[float, float, np.ndarray]
     return [(10.0**e, 10.0 ** (e + 1), exponent == e) for e in np.unique(exponent).tolist()]
 
 
+def slices(volume_fraction: np.ndarray) -> list[tuple[int, np.ndarray]]:
+    """Part volume fractions (m,) by the nearest power of ten: (exponent, inside (m,)) of each.
+
+    So a range from 1e-9 to 1e-3 has the seven slices of the paper's densities, of which the first
+    and the last are half a decade wide, and the others one.
+    """
+    exponent = np.round(np.log10(volume_fraction)).astype(int)
+    return [(e, exponent == e) for e in np.unique(exponent).tolist()]
+
+
 def check_forces(volume_fraction, force) -> tuple[np.ndarray, np.ndarray]:
     """Return volume fractions (m,) and forces (m, 3) as float64, or raise ValueError."""
     volume_fraction = np.asarray(volume_fraction, dtype=float)
@@ -222,12 +239,33 @@ def _kernel_density(values, points, bound=np.inf):
     factor, normal_range = SILVERMAN
     deviation = values.std()
     if deviation == 0:
-        raise ValueError(f"all {len(values)} forces of a decade are {values[0]}: no density")
-    # Half of the values may be equal (forces 24 of a dilute decade): then the deviation counts.
+        raise ValueError(f"all {len(values)} forces of a slice are {values[0]}: no density")
+    # Half of the values may be equal (forces 24 of a dilute slice): then the deviation counts.
     spread = min(deviation, stats.iqr(values) / normal_range) or deviation
-    width = factor * spread * len(values) ** -0.2
-    kernels = stats.gaussian_kde(values, width / values.std(ddof=1))
-    low, high = values.min() - KERNEL_REACH * width, values.max() + KERNEL_REACH * width
+    values = np.sort(values)
+    widths = np.fmax(factor * spread * len(values) ** -0.2, _nearest_distance(values))
+    low = (values - KERNEL_REACH * widths).min()
+    high = (values + KERNEL_REACH * widths).max()
     folded = values.max() <= bound < high
-    x = np.linspace(low, bound if folded else high, points)
-    return x, kernels(x) + kernels(2 * bound - x) if folded else kernels(x)
+    high = bound if folded else high
+    dense = np.quantile(values, np.linspace(0, 1, points // 2))
+    x = np.sort(np.concatenate([dense, np.linspace(low, high, points - len(dense))]))
+    density = _kernels(x, values, widths)
+    return x, density + _kernels(2 * bound - x, values, widths) if folded else density
+
+
+def _nearest_distance(values):
+    """Distance of each of the sorted values (m,) from its `NEAREST`-th nearest, or the farthest."""
+    m = len(values)
+    nearest = min(NEAREST, m - 1)
+    # The nearest samples of a sorted one stand on its two sides: at most so many on either.
+    beside = np.arange(m)[:, None] + np.arange(-nearest, nearest + 1)
+    distance = np.abs(values[np.clip(beside, 0, m - 1)] - values[:, None])
+    distance[(beside < 0) | (beside >= m)] = np.inf
+    return np.sort(distance, axis=1)[:, nearest]
+
+
+def _kernels(x, values, widths):
+    """Mean at x of normal densities of their own widths about the values."""
+    exponent = ((x[:, None] - values) / widths) ** 2
+    return (np.exp(-0.5 * exponent) / widths).mean(axis=1) / np.sqrt(2 * np.pi)

@@ -11,6 +11,9 @@ PAPER_MESH_STUDY = pd.DataFrame(
 """Force on an isolated sphere [Re_p c_D] against the nodes of sphere and outer sphere together
 (paper, figure of the mesh validation study, read from the points that its source lists)."""
 
+PAPER_NEIGHBOURS = 5
+"""Neighbours that a particle feels in the paper, as it writes."""
+
 PAPER_SETTLING = pd.DataFrame(
     [
         ("inverse_beta", 1e-3, 1.39, ">=", "tip of a drawn arrow that stops short of its point"),

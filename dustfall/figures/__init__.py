@@ -13,6 +13,7 @@ from dustfall.figures.forces import (
 )
 from dustfall.figures.frozen_cloud import frozen_cloud
 from dustfall.figures.mesh import mesh_study
+from dustfall.figures.neighbours import neighbour_numbers
 from dustfall.figures.settling import (
     inverse_beta,
     phase_and_spectra,
@@ -36,6 +37,7 @@ __all__ = [
     "learning_curve",
     "lifetimes",
     "mesh_study",
+    "neighbour_numbers",
     "phase_and_spectra",
     "predicted_vs_target",
     "save",

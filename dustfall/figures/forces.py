@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import LogLocator, MaxNLocator
 
 from dustfall.figures.style import (
     COMPONENT_COLOURS,
@@ -15,6 +15,7 @@ from dustfall.figures.style import (
     model_title,
     new_figure,
     phi_colour,
+    phi_label,
     require,
     require_components,
     styled,
@@ -22,6 +23,12 @@ from dustfall.figures.style import (
 from dustfall.units import STOKES_DRAG
 
 FORCE_UNIT = r"[$\mathrm{Re}_p c_D$]"
+
+LEAST_DENSITY = 1e-3
+"""Lowest density [1/(Re_p c_D)] that is drawn: of a few samples in a slice of thousands."""
+
+DENSITY_ROOM = 6.0
+"""Factor between the highest density and the top of its axis, where the notes stand."""
 
 LINES = {"radial": "-", "azimuthal": ":", "polar": "--"} | {
     "spanwise": ":",
@@ -75,74 +82,47 @@ def force_scatter(frame: pd.DataFrame) -> Figure:
 
 @styled
 def force_pdf(frame: pd.DataFrame) -> Figure:
-    """P.d.f. of the force per decade of volume fraction: streamwise left, lateral right.
+    """P.d.f. of the force in slices of the volume fraction: streamwise left, lateral right.
 
-    `frame`: component, phi_low, phi_high, samples, force, density, laplace_density, laplace_ks,
-    laplace_ks_level, as `analysis.distributions.force_distributions` gives. Each decade is a ridge
-    with its own height; the number on it is its highest density. Dotted on the right: the fitted
-    Laplace law, with its Kolmogorov-Smirnov distance and, in brackets, that which one fit in twenty
-    exceeds.
-    Raises ValueError for a missing column or fewer than two rows.
+    `frame`: component, slice, force, density, laplace_density, laplace_ks, laplace_ks_level, as
+    `analysis.distributions.force_distributions` gives. One row of panels a slice, dilute above, all
+    on one logarithmic axis of density a column. Dotted on the right: the fitted Laplace law, with
+    its Kolmogorov-Smirnov distance and, in brackets, that which one fit in twenty exceeds. Raises
+    ValueError for a missing column or fewer than two rows.
     """
-    columns = ["component", "phi_low", "phi_high", "force", "density"]
     law = ["laplace_density", "laplace_ks", "laplace_ks_level"]
-    require(frame, columns + law, "force_pdf", fewest=2)
+    require(frame, ["component", "slice", "force", "density", *law], "force_pdf", fewest=2)
     require_components(frame, ["streamwise", "spanwise", "vertical"], "force_pdf")
-    decades = sorted(frame["phi_low"].unique())
-    figure = new_figure(DOUBLE, 1.3 + 0.55 * len(decades))
-    axes = figure.subplots(1, 2, sharey=True)
-    panels = {"streamwise": ["streamwise"], "lateral": ["spanwise", "vertical"]}
-    height = 1.35
-    for ax, (panel, components) in zip(axes, panels.items(), strict=True):
+    slices = sorted(frame["slice"].unique())
+    figure = new_figure(DOUBLE, 1.0 + 0.8 * len(slices))
+    axes = figure.subplots(len(slices), 2, sharex="col", sharey="col", squeeze=False)
+    columns = {"streamwise": ["streamwise"], "lateral": ["spanwise", "vertical"]}
+    for column, (name, components) in enumerate(columns.items()):
         part = frame[frame["component"].isin(components)]
-        margin = 0.02 * np.ptp(part["force"])
-        left, right = part["force"].min() - margin, part["force"].max() + margin
-        if panel == "lateral":
-            # Room for the notes, which the wide tails would run through.
-            left -= 0.3 * (right - left)
-        for level in reversed(range(len(decades))):
-            rows = part[part["phi_low"] == decades[level]]
-            peak = rows["density"].max()
-            scale = height / np.fmax(peak, rows["laplace_density"].max())
-            colour = phi_colour(np.sqrt(rows["phi_low"].iloc[0] * rows["phi_high"].iloc[0]))
-            order = 10 - level
-            ax.axhline(level, color="0.6", lw=0.4, zorder=order)
+        for ax, phi in zip(axes[:, column], slices, strict=True):
             for component, line in zip(components, ("-", (0, (4, 1))), strict=False):
-                curve = rows[rows["component"] == component]
-                x, y = curve["force"], level + scale * curve["density"]
+                curve = part[(part["slice"] == phi) & (part["component"] == component)]
+                x, y, colour = curve["force"], curve["density"], COMPONENT_COLOURS[component]
+                ax.plot(x, y, color=colour, ls=line, lw=0.9)
                 if component == components[0]:
-                    ax.fill_between(x, level, y, color=colour, alpha=0.45, lw=0, zorder=order)
-                ax.plot(x, y, color=COMPONENT_COLOURS[component], ls=line, lw=0.9, zorder=order)
-            note = f"peak {peak:.2g}"
-            if panel == "lateral":
-                curve = rows[rows["component"] == components[0]]
-                y = level + scale * curve["laplace_density"]
-                ax.plot(curve["force"], y, color="k", ls=":", lw=0.9, zorder=order)
+                    ax.fill_between(x, LEAST_DENSITY, y, color=phi_colour(phi), alpha=0.4, lw=0)
+                if component == "spanwise":
+                    ax.plot(x, curve["laplace_density"], color="k", ls=":", lw=0.9)
+            log_scale(ax, "y")
+            ax.yaxis.set_major_locator(LogLocator(numticks=4))
+            note = rf"$\varphi = ${phi_label(phi)}"
+            if name == "lateral":
                 found, expected = curve[["laplace_ks", "laplace_ks_level"]].iloc[0]
-                note += f"\nKS {found:.2g} ({expected:.2g})"
-            ax.annotate(
-                note,
-                (0.015, level),
-                (0, 3),
-                xycoords=("axes fraction", "data"),
-                textcoords="offset points",
-                fontsize=7,
-                zorder=20,
-            )
-        ax.set_xlim(left, right)
-        ticks = MaxNLocator(nbins=6, steps=[1, 2, 5, 10]).tick_values(
-            *part["force"].agg(["min", "max"])
-        )
-        ax.set_xticks([t for t in ticks if part["force"].min() <= t <= right])
-        ax.set_xlabel(f"{panel} force {FORCE_UNIT}")
-    axes[0].axvline(STOKES_DRAG, color="k", lw=0.8, ls="--", zorder=0)
-    axes[0].set_yticks(range(len(decades)))
-    exponents = [round(np.log10(low)) for low in decades]
-    axes[0].set_yticklabels([f"$10^{{{e}}}$ to $10^{{{e + 1}}}$" for e in exponents])
-    axes[0].set_ylabel(r"p.d.f. in each decade of $\varphi$, each to its own peak")
-    axes[0].set_ylim(-0.15, len(decades) - 1 + height + 0.25)
-    axes[0].tick_params(axis="y", length=0)
-    axes[1].tick_params(axis="y", length=0)
+                note = f"KS {found:.2g} ({expected:.2g})"
+            ax.text(0.02, 0.8, note, transform=ax.transAxes, fontsize=8)
+        seen = part.loc[part["density"] >= LEAST_DENSITY, "force"]
+        margin = 0.02 * np.ptp(seen)
+        ax.set_xlim(seen.min() - margin, seen.max() + margin)
+        ax.set_ylim(LEAST_DENSITY, DENSITY_ROOM * part["density"].max())
+        ax.set_xlabel(f"{name} force {FORCE_UNIT}")
+    for ax in axes[:, 0]:
+        ax.set_ylabel(r"p.d.f. [$1/\mathrm{Re}_p c_D$]", fontsize=8)
+        ax.axvline(STOKES_DRAG, color="k", lw=0.8, ls="--", zorder=0)
     handles = [
         Line2D([], [], color=COMPONENT_COLOURS["streamwise"], label="streamwise"),
         Line2D([], [], color=COMPONENT_COLOURS["spanwise"], label="spanwise"),
@@ -151,7 +131,7 @@ def force_pdf(frame: pd.DataFrame) -> Figure:
         Line2D([], [], color="k", ls="--", lw=0.8, label="Stokes, 24"),
     ]
     figure.legend(handles=handles, loc="outside upper center", ncols=5)
-    letter(axes)
+    letter(axes[0])
     return figure
 
 

@@ -10,6 +10,7 @@ from dustfall.analysis.distributions import (
     force_distributions,
     force_samples,
     force_summary,
+    slices,
 )
 
 
@@ -23,17 +24,17 @@ def forces(m=3000, seed=1):
 
 def test_each_density_integrates_to_one():
     table = force_distributions(*forces())
-    assert table.groupby(["component", "phi_low"]).ngroups == 15
-    for _, curve in table.groupby(["component", "phi_low"]):
+    assert table.groupby(["component", "slice"]).ngroups == 18
+    for _, curve in table.groupby(["component", "slice"]):
         assert integrate.trapezoid(curve["density"], curve["force"]) == pytest.approx(1, abs=2e-3)
 
 
 def test_no_density_lies_above_stokes_drag_where_no_force_does():
     table = force_distributions(*forces())
     streamwise = table[table["component"] == "streamwise"]
-    assert streamwise.groupby("phi_low")["force"].max().unique().tolist() == [24.0]
+    assert streamwise.groupby("slice")["force"].max().unique().tolist() == [24.0]
     # Uniform up to 24: the density keeps its level up to the end, which half of a kernel would not.
-    at_bound = streamwise.groupby("phi_low").last()
+    at_bound = streamwise.groupby("slice").last()
     assert (at_bound["density"] > 0.7 / 12).all()
 
 
@@ -44,6 +45,31 @@ def test_density_of_normal_samples_is_the_normal_density():
     error = table["density"] - stats.norm.pdf(table["force"])
     # The kernel estimate of 20,000 samples scatters by 0.007 at the peak.
     assert np.abs(error).max() < 0.03
+
+
+def test_a_long_tail_has_a_density_in_one_piece_and_a_peak_its_height():
+    # Laplace of width 0.01 in nine of ten samples, of width one in the tenth.
+    rng = np.random.default_rng(7)
+    m = 3000
+    width = np.where(np.arange(m) % 10 > 0, 0.01, 1.0)
+    force = np.column_stack([width * rng.laplace(size=m), np.full(m, 20.0) + rng.normal(size=m),
+                             width * rng.laplace(size=m)])  # fmt: skip
+    curve = force_distributions(np.full(m, 1e-8), force).query("component == 'spanwise'")
+    x, density = curve["force"].to_numpy(), curve["density"].to_numpy()
+    exact = 0.9 * stats.laplace.pdf(x, scale=0.01) + 0.1 * stats.laplace.pdf(x)
+    tail = (np.abs(x) > 0.3) & (np.abs(x) < 2.5)
+    # Some ten samples lie under a kernel there: a value scatters by about a third.
+    assert np.sqrt(np.mean(np.log(density[tail] / exact[tail]) ** 2)) < 0.5
+    assert density.max() == pytest.approx(0.9 * 50, rel=0.25)
+
+
+def test_the_papers_range_has_its_seven_slices():
+    phi = np.logspace(-9, -3, 61)
+    parts = slices(phi)
+    assert [exponent for exponent, _ in parts] == list(range(-9, -2))
+    assert (sum(inside.astype(int) for _, inside in parts) == 1).all()
+    for exponent, inside in parts:
+        assert np.abs(np.log10(phi[inside]) - exponent).max() <= 0.5 + 1e-9
 
 
 def test_a_decade_holds_its_lower_end_and_the_last_one_its_upper():
@@ -121,7 +147,7 @@ def test_bad_forces_are_refused(phi, force, match):
 
 
 def test_too_few_samples_for_a_density_are_refused():
-    with pytest.raises(ValueError, match="no decade"):
+    with pytest.raises(ValueError, match="no slice"):
         force_distributions([1e-5], [[0.0, 20.0, 0.0]])
     with pytest.raises(ValueError, match="no density"):
         force_distributions(np.full(9, 1e-5), np.tile([0.1, 20.0, 0.2], (9, 1)) + _jiggle())

@@ -272,6 +272,23 @@ def mesh_study():
     return mesh_study_table(pd.concat(study, ignore_index=True))
 
 
+def neighbour_numbers():
+    rows = [
+        {
+            "neighbours": number,
+            "volume_fraction": phi,
+            "status": "steady" if phi == 1e-3 else "too short",
+            "value": 1 + number * phi**0.3,
+            "half": 0.01,
+            "paper": {1e-5: 1.0826, 1e-3: 1.39}.get(phi, np.nan),
+            "relation": {1e-5: "=", 1e-3: ">="}.get(phi),
+        }
+        for phi in PHI
+        for number in (1, 4, 5, 50)
+    ]
+    return pd.DataFrame(rows)
+
+
 TABLES = {
     table.__name__: table
     for table in (
@@ -295,6 +312,7 @@ TABLES = {
         voronoi_pdf,
         voronoi_variance,
         mesh_study,
+        neighbour_numbers,
     )
 }
 
@@ -314,6 +332,7 @@ def pairs(frame, x, y) -> set[tuple[float, float]]:
 
 XY = {
     "force_scatter": ("volume_fraction", "force"),
+    "force_pdf": ("force", "density"),
     "spearman": ("neighbours", "rho"),
     "predicted_vs_target": ("target", "predicted"),
     "error_by_distance": ("gap", "rms_error"),
@@ -325,6 +344,7 @@ XY = {
     "voronoi_pdf": ("volume", "density"),
     "voronoi_variance": ("inverse_beta", "variance"),
     "mesh_study": ("nodes", "force"),
+    "neighbour_numbers": ("neighbours", "value"),
 }
 
 
@@ -404,6 +424,23 @@ def test_the_papers_bounds_have_an_arrow_each_and_its_points_none():
     assert [tuple(text.xy) for text in ax.texts] == [(1e-3, 1.39)]
 
 
+def test_a_curve_crosses_one_at_the_number_of_neighbours_that_gives_the_papers_velocity():
+    table = neighbour_numbers()
+    left, right = figures.neighbour_numbers(table).axes
+    for phi, paper in ((1e-5, 1.0826), (1e-3, 1.39)):
+        (curve,) = [
+            line for line in right.lines
+            if line.get_color() == phi_colour(phi) and line.get_linestyle() == "-"
+        ]  # fmt: skip
+        # 1 + M phi^0.3 is the paper's where M is this.
+        expected = (paper - 1) / phi**0.3
+        number, excess = curve.get_xydata().T
+        assert np.interp(1.0, excess, number) == pytest.approx(expected)
+        assert number.max() == 5
+    # The bound is an arrow, the other point none; a phi that the paper lacks has no curve.
+    assert [tuple(text.xy) for text in left.texts] == [(5, 1.39)]
+
+
 def test_paths_in_space_keep_their_heights_and_cast_their_shadows_on_the_floor():
     table = trajectories()
     axes = figures.trajectories_3d(table).axes
@@ -419,21 +456,18 @@ def test_paths_in_space_keep_their_heights_and_cast_their_shadows_on_the_floor()
             )
 
 
-def test_ridges_are_the_densities_on_one_scale_within_a_decade():
+def test_slices_share_an_axis_of_density_and_the_fitted_law_is_drawn_at_its_places():
     table = force_pdf()
-    left, right = figures.force_pdf(table).axes
-    for ax, component in ((left, "streamwise"), (right, "spanwise")):
-        for level, (_, decade) in enumerate(table.groupby("phi_low")):
-            curve = decade[decade["component"] == component]
-            ridges = [
-                line.get_ydata() - level
-                for line in ax.lines
-                if np.array_equal(line.get_xdata(), curve["force"])
-            ]
-            scale = [ridge / curve["density"] for ridge in ridges]
-            constant = [s.mean() for s in scale if np.ptp(s) < 1e-6 * s.mean()]
-            assert constant
-            assert 0 < constant[0] * curve["density"].max() < 1.36
+    axes = np.array(figures.force_pdf(table).axes).reshape(-1, 2)
+    assert len(axes) == table["slice"].nunique()
+    for column, component in enumerate(("streamwise", "spanwise")):
+        assert len({ax.get_ylim() for ax in axes[:, column]}) == 1
+        for ax, (_, rows) in zip(axes[:, column], table.groupby("slice"), strict=True):
+            own = rows[rows["component"] == component]
+            drawn = {tuple(p) for line in ax.lines for p in line.get_xydata().tolist()}
+            assert pairs(own, "force", "density") <= drawn
+            if component == "spanwise":
+                assert pairs(own, "force", "laplace_density") <= drawn
 
 
 def assert_labels_fit(figure):
@@ -486,7 +520,7 @@ def test_empty_tables_and_missing_columns_are_refused(name):
     draw, table = getattr(figures, name), TABLES[name]()
     with pytest.raises(ValueError, match=f"{name} has 0 rows"):
         draw(table.iloc[:0])
-    drawn = XY.get(name, ("density" if name == "force_pdf" else "volume_fraction",))[-1]
+    drawn = XY.get(name, ("volume_fraction",))[-1]
     others = {"learning_curve": "r2", "accuracy_vs_cost": "r2"}
     drawn = "dz" if name.startswith("trajectories") else others.get(name, drawn)
     with pytest.raises(ValueError, match=f"{name} lacks the column '{drawn}'"):

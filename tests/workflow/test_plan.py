@@ -186,6 +186,7 @@ def test_studies_are_no_part_of_all_and_take_one_run_a_setting(project):
         # 8 numbers of neighbours at 3 volume fractions
         "study_of_neighbours": 8 * 3,
         "neighbour_numbers": 1,
+        "figure_neighbour_numbers": 1,
         "study_of_moving_neighbours": 2,
         "moving_neighbours": 1,
         "moving_spheres": 1,

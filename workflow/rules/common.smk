@@ -52,6 +52,7 @@ TITLES = {
     "inverse_beta": ("Averages", "Settling velocity against volume fraction"),
     "independence_of_n": ("Averages", "Dependence on the number of particles"),
     "neighbour_changes": ("Averages", "Changes of neighbours"),
+    "neighbour_numbers": ("Averages", "How many neighbours"),
     "frozen_cloud": ("Averages", "Frozen clouds: five neighbours and all"),
     "settling_in_time": ("In time", "Mean and variance in time"),
     "trajectories": ("In time", "Paths of three particles"),

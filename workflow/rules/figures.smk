@@ -16,7 +16,7 @@ rule figure_force_scatter:
 
 
 rule figure_force_pdf:
-    """P.d.f. of the force in each decade of volume fraction."""
+    """P.d.f. of the force in slices about powers of ten of the volume fraction."""
     input:
         data="results/dataset/forces.h5",
     output:

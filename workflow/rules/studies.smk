@@ -129,6 +129,21 @@ rule neighbour_numbers:
         "../scripts/neighbour_numbers.py"
 
 
+rule figure_neighbour_numbers:
+    """Settling velocity against the number of neighbours, drawn."""
+    input:
+        table=rules.neighbour_numbers.output[0],
+    output:
+        **figure("neighbour_numbers", "Sedimentation"),
+    log:
+        "logs/figures/neighbour_numbers.log",
+    localrule: True
+    params:
+        library=library("figure_neighbour_numbers.py"),
+    script:
+        "../scripts/figure_neighbour_numbers.py"
+
+
 rule study_of_moving_neighbours:
     """Let a small cloud settle among neighbours that move as one, or each in its own way."""
     input:

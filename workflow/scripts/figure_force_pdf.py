@@ -1,4 +1,4 @@
-"""Draw the p.d.f. of the force in each decade of phi."""
+"""Draw the p.d.f. of the force in slices about powers of ten of phi."""
 
 from pathlib import Path
 
