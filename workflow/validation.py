@@ -632,6 +632,8 @@ CLOSURE_TABLES: dict[str, tuple[Callable[..., pd.DataFrame], tuple[str, ...]]] =
 
 PAPER_TABLES: dict[str, tuple[Callable[..., pd.DataFrame], tuple[str, ...]]] = {
     "settling": (apparent, (STEADY_STATE, CONFIGURATION)),
+    "neighbour_numbers": (neighbour_numbers, ("results/studies/neighbour_numbers.csv",)),
+    "steps": (pd.DataFrame, ("results/studies/step_size.csv",)),
 }
 """The same of the page that goes through the paper."""
 

@@ -2,10 +2,11 @@
 
 from collections.abc import Iterable, Sequence
 
+import numpy as np
 import pandas as pd
 import xarray as xr
 
-from dustfall.analysis.references import PAPER_SETTLING
+from dustfall.analysis.references import PAPER_SETTLING, PAPER_WINDOW
 from dustfall.analysis.settling import case_of, from_time, steadiness, with_starts
 from dustfall.analysis.time_averages import mean_with_interval
 
@@ -23,8 +24,8 @@ def neighbour_numbers_table(
     Returns
     -------
     columns neighbours, volume_fraction, n, status (`settling.steadiness`), value and half (of the
-    95 % interval by batch means) [v_s], paper and relation (NaN and empty where it has none);
-    sorted
+    95 % interval by batch means) [v_s], as_paper (mean over the paper's window, NaN for a run that
+    ends before it does), paper and relation (NaN and empty where it has none); sorted
 
     Raises
     ------
@@ -45,9 +46,19 @@ def neighbour_numbers_table(
                 "status": steadiness([window])[0],
                 "value": mean.value,
                 "half": mean.half_width,
+                "as_paper": _mean_as_paper(run),
                 "paper": point.value if point else None,
                 "relation": point.relation if point else "",
             }
         )
     table = pd.DataFrame(rows).sort_values(["volume_fraction", "neighbours"], ignore_index=True)
     return table.astype({"paper": float})
+
+
+def _mean_as_paper(run):
+    """Mean settling velocity over `PAPER_WINDOW`; NaN where the run ends before."""
+    time, velocity = run["time"].values, run["settling_velocity_mean"].values
+    first, last = PAPER_WINDOW
+    if time[-1] < last:
+        return np.nan
+    return float(velocity[(time >= first) & (time <= last)].mean())

@@ -6,13 +6,18 @@ PAPER_MESH_STUDY = pd.DataFrame(
     {
         "nodes": [212.04, 346.16, 547.91, 827.11, 1088.37, 1506.72],
         "force": [10.0435, 17.5225, 19.8189, 22.1898, 23.2453, 24.3809],
+        "share": [0.88, 0.92, 0.78, 0.77, 0.70, 0.72],
     }
 )
-"""Force on an isolated sphere [Re_p c_D] against the nodes of sphere and outer sphere together
-(paper, figure of the mesh validation study, read from the points that its source lists)."""
+"""Force on an isolated sphere [Re_p c_D] against the nodes of sphere and outer sphere together, and
+the share of the nodes on the sphere (paper, figure of the mesh validation study, read from the
+points and labels that its source lists)."""
 
 PAPER_NEIGHBOURS = 5
 """Neighbours that a particle feels in the paper, as it writes."""
+
+PAPER_WINDOW = (50.0, 100.0)
+"""Times [tau] between which the paper averages, as read here: it gives the first alone."""
 
 PAPER_SETTLING = pd.DataFrame(
     [

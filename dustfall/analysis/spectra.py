@@ -20,6 +20,9 @@ from dustfall.analysis.time_averages import ROUNDING
 
 METHODS = ("periodogram", "welch")
 
+REDUCED, SI = UNITS = ("reduced", "SI")
+"""Units of a spectrum: v_s, d_p and tau, or metres and seconds."""
+
 BINS_PER_DECADE = 20
 """Of an averaged spectrum: narrow beside what a slope is fitted over, wide enough to average."""
 
@@ -148,7 +151,12 @@ def spectral_slope(kappa, energy, ordinates=None, limits=(0.0, np.inf)) -> Power
 
 
 def phase_and_spectra(
-    runs: list[xr.Dataset], start: float, fit_frequencies=(0.0, np.inf), points=1000, **settings
+    runs: list[xr.Dataset],
+    start: float,
+    fit_frequencies=(0.0, np.inf),
+    points=1000,
+    units=REDUCED,
+    **settings,
 ) -> pd.DataFrame:
     """Tabulate the phase diagram and the energy spectrum of each run's tracked particles.
 
@@ -156,14 +164,15 @@ def phase_and_spectra(
     buoyancy], both (step, tracked, spatial), gravity along -z; attribute stokes_number); `start`
     of the statistics [tau]; `fit_frequencies`, limits [1/tau] of the slope's fit, of which the
     upper is held at half the Nyquist frequency (above it aliasing bends the spectrum); `points`,
-    the most rows of a phase diagram; `settings` of `power_spectral_density`.
+    the most rows of a phase diagram; `units` of the spectra (`in_units`); `settings` of
+    `power_spectral_density`.
 
     Returns the columns panel ("phase", "spectrum" or "fit"), volume_fraction, n, particle (from
-    1), x, y, slope, slope_error. Phase: x = v_s/v_s,Stokes, y = F_d/(F_g - F_b). Spectrum: x =
-    kappa [1/d_p], y = E [v_s^2 d_p], averaged in bins. Fit: the two ends of the fitted line.
+    1), x, y, slope, slope_error, units. Phase: x = v_s/v_s,Stokes, y = F_d/(F_g - F_b). Spectrum:
+    x = kappa [1/d_p], y = E [v_s^2 d_p], averaged in bins. Fit: the two ends of the fitted line.
     A particle whose velocity never changes has a phase point and no spectrum.
 
-    Raises ValueError for no run, uneven time steps or too short a run.
+    Raises ValueError for no run, unknown units, uneven time steps or too short a run.
     """
     tables = []
     for run in runs:
@@ -183,7 +192,7 @@ def phase_and_spectra(
         for i in range(velocity.shape[1]):
             settling = -velocity[:, i]
             head = {k: case[k] for k in ("volume_fraction", "n")} | {"particle": i + 1}
-            phase = {"panel": "phase", "x": settling[kept], "y": drag[kept, i]}
+            phase = {"panel": "phase", "x": settling[kept], "y": drag[kept, i], "units": units}
             tables.append(pd.DataFrame(head | phase))
             # A float32 series of an undisturbed particle differs by rounding alone.
             if np.ptp(settling) <= ROUNDING * abs(settling.mean()):
@@ -198,14 +207,15 @@ def phase_and_spectra(
             )
             found = {"slope": law.slope, "slope_error": law.standard_error}
             curve = {"panel": "spectrum", "x": spectrum["kappa"], "y": spectrum["energy"]}
-            tables.append(pd.DataFrame(head | curve | found))
             ends = np.clip(limits, spectrum["kappa"].min(), spectrum["kappa"].max())
-            tables.append(pd.DataFrame(head | {"panel": "fit", "x": ends, "y": law(ends)} | found))
+            fit = {"panel": "fit", "x": ends, "y": law(ends)}
+            both = [pd.DataFrame(head | part | found) for part in (curve, fit)]
+            tables.append(in_units(pd.concat(both), run, units))
     if not tables:
         raise ValueError("there are no runs: at least one series is needed")
     table = pd.concat(tables, ignore_index=True)
     columns = ["panel", "volume_fraction", "n", "particle", "x", "y", "slope", "slope_error"]
-    return table.reindex(columns=columns)
+    return table.reindex(columns=[*columns, "units"])
 
 
 def cloud_spectra(
@@ -213,23 +223,25 @@ def cloud_spectra(
     starts: float | Sequence[float],
     fit_frequencies=(0.0, np.inf),
     progress=None,
+    units=REDUCED,
 ) -> pd.DataFrame:
     """Tabulate the energy spectrum of the settling velocity, averaged over all particles.
 
     Parameters: `trajectories` (velocities (frame, atom, spatial) [v_s], coordinates, cell_lengths;
     attribute stokes_number), `starts` of their statistics [tau], `fit_frequencies` as in
-    `phase_and_spectra`, `progress`.
+    `phase_and_spectra`, `progress`, `units` of the spectra (`in_units`).
     kappa = 2 pi f / mean v with the mean over the cloud. The spectrum comes by both methods: the
     plain periodogram of the paper, and Welch's with its Hann window.
 
     The slope's 95 % interval is a jackknife: the cloud is cut into ten slabs by where particles
     were at `start`, so that neighbours stay together, and each slab is left out in turn.
 
-    Returns the columns method, panel ("spectrum" or "fit"), volume_fraction, n, x = kappa [1/d_p],
-    y = E [v_s^2 d_p], slope, slope_low, slope_high. A case whose particles all keep their velocity
-    has no rows.
+    Returns the columns method, panel, volume_fraction, n, x, y, slope, slope_low, slope_high,
+    units. Panel "density": x = f [1/tau], y = PSD [v_s^2 tau]; "spectrum" and "fit": x = kappa
+    [1/d_p], y = E [v_s^2 d_p]. A case whose particles all keep their velocity has no rows.
 
-    Raises ValueError for no trajectory, uneven frames or fewer than four after `start`.
+    Raises ValueError for no trajectory, unknown units, uneven frames or fewer than four after
+    `start`.
     """
     tables = []
     for done, (trajectory, start) in enumerate(with_starts(trajectories, starts), start=1):
@@ -245,15 +257,43 @@ def cloud_spectra(
                 energy = density[:, 1:] * speed / (2 * np.pi)
                 highest = min(fit_frequencies[1], HIGHEST_FITTED / interval)
                 limits = 2 * np.pi * np.array([fit_frequencies[0], highest]) / speed
-                found = {"method": method} | head
-                tables.append(_with_slope(kappa, energy, slab, limits).assign(**found))
+                of_velocity = {"x": frequency[1:], "y": density[:, 1:].mean(axis=0)}
+                both = [
+                    pd.DataFrame({"panel": "density"} | of_velocity),
+                    _with_slope(kappa, energy, slab, limits),
+                ]
+                found = pd.concat(both).assign(method=method, **head)
+                tables.append(in_units(found, trajectory, units))
         if progress:
             progress(done, len(trajectories))
     if not tables:
         raise ValueError("there is no trajectory whose particles change their velocity")
     table = pd.concat(tables, ignore_index=True)
     columns = ["method", "panel", "volume_fraction", "n", "x", "y"]
-    return table[[*columns, "slope", "slope_low", "slope_high"]]
+    return table[[*columns, "slope", "slope_low", "slope_high", "units"]]
+
+
+def in_units(table: pd.DataFrame, run: xr.Dataset, units: str) -> pd.DataFrame:
+    """Give the spectra of a run, in v_s, d_p and tau, other units: "reduced" leaves them.
+
+    `table`: panel, x, y. In "SI" the panels "spectrum" and "fit" get kappa [1/m] and E [m^3/s^2],
+    "density" gets f [Hz] and the density of the velocity [(m^2/s^2)/Hz]. Returns it with the column
+    units. Raises ValueError for other units, or a run without the attributes diameter [m],
+    response_time [s] and settling_velocity [m/s].
+    """
+    if units not in UNITS:
+        raise ValueError(f"units are {units!r}; allowed: {', '.join(UNITS)}")
+    table = table.assign(units=units)
+    if units == REDUCED:
+        return table
+    try:
+        length, time, velocity = (
+            float(run.attrs[name]) for name in ("diameter", "response_time", "settling_velocity")
+        )
+    except KeyError as error:
+        raise ValueError(f"the dataset lacks the attribute {error}, which SI units need") from None
+    scale = table["panel"].map({"density": time}).fillna(length)
+    return table.assign(x=table["x"] / scale, y=table["y"] * velocity**2 * scale)
 
 
 def _with_slope(kappa, energy, slab, limits) -> pd.DataFrame:

@@ -30,8 +30,9 @@ ISOLATED = np.zeros((1, 3))
 def mesh_study(sizes: Sequence[float], progress=None) -> pd.DataFrame:
     """Drag on an isolated sphere for the paper's formulation, every scheme and edge length [radii].
 
-    Returns the columns scheme, size [radii], nodes (vertices of all meshes), elements, force and
-    limit, the exact force of the formulation [Re_p c_D]: 24, or with the outer sphere 24.053.
+    Returns the columns scheme, size [radii], nodes (vertices of all meshes), share (of the nodes on
+    the particle), elements, force and limit, the exact force of the formulation [Re_p c_D]: 24, or
+    with the outer sphere 24.053.
     """
     rows = []
     for done, size in enumerate(sorted(sizes, reverse=True), start=1):
@@ -50,10 +51,12 @@ def mesh_study(sizes: Sequence[float], progress=None) -> pd.DataFrame:
 
 
 def _row(scheme: str, size: float, meshes: Sequence[SphereMesh], force: float) -> dict:
+    nodes = [len(mesh.vertices) for mesh in meshes]
     return {
         "scheme": scheme,
         "size": size,
-        "nodes": sum(len(mesh.vertices) for mesh in meshes),
+        "nodes": sum(nodes),
+        "share": nodes[0] / sum(nodes),
         "elements": sum(len(mesh.triangles) for mesh in meshes),
         "force": force,
         "limit": exact_drag_in_outer_sphere() if scheme == PAPER_FORMULATION else STOKES_DRAG,

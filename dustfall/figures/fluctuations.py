@@ -22,32 +22,53 @@ METHOD_NAMES = {
 }
 
 
+WAVENUMBER = {"reduced": r"wavenumber $\kappa\;[1/d_p]$", "SI": r"wavenumber $\kappa$ [1/m]"}
+
+ENERGY = {
+    "reduced": r"$E(\kappa)\;[v_{s,\mathrm{Stokes}}^2\, d_p]$",
+    "SI": r"$E(\kappa)\;[\mathrm{m}^3/\mathrm{s}^2]$",
+}
+
+FREQUENCY = {"reduced": r"frequency $f\;[1/\tau]$", "SI": r"frequency $f$ [Hz]"}
+
+DENSITY = {
+    "reduced": r"$\mathrm{PSD}(f)\;[v_{s,\mathrm{Stokes}}^2\, \tau]$",
+    "SI": r"$\mathrm{PSD}(f)\;[(\mathrm{m}^2/\mathrm{s}^2)/\mathrm{Hz}]$",
+}
+"""Labels of spectra in each of `analysis.spectra.UNITS`."""
+
+
 @styled
 def cloud_spectra(frame: pd.DataFrame) -> Figure:
-    """Energy spectrum averaged over all particles, by both methods, with the fitted power laws.
+    """Spectra of the velocity averaged over all particles, by both methods, a column each.
 
-    `frame`: method, panel, volume_fraction, n, x, y, slope, slope_low, slope_high, as
-    `analysis.spectra.cloud_spectra` gives for one n. Raises ValueError for a missing column,
+    `frame`: method, panel, volume_fraction, n, x, y, slope, slope_low, slope_high, units, as
+    `analysis.spectra.cloud_spectra` gives for one n. Above the density over frequency, below the
+    energy over wavenumber with the fitted power laws. Raises ValueError for a missing column,
     several n or fewer than two rows.
     """
     columns = ["method", "panel", "volume_fraction", "n", "x", "y", "slope", "slope_low"]
-    require(frame, [*columns, "slope_high"], "cloud_spectra", fewest=2)
+    require(frame, [*columns, "slope_high", "units"], "cloud_spectra", fewest=2)
     if frame["n"].nunique() > 1:
         raise ValueError(f"cloud_spectra draws one n, not {frame['n'].unique().tolist()}")
     methods = [method for method in METHOD_NAMES if method in set(frame["method"])]
-    figure = new_figure(DOUBLE, 3.6)
-    axes = figure.subplots(1, len(methods), squeeze=False, sharex=True, sharey=True)[0]
-    for ax, method in zip(axes, methods, strict=True):
+    units = frame["units"].iloc[0]
+    figure = new_figure(DOUBLE, 5.8)
+    axes = figure.subplots(2, len(methods), squeeze=False, sharex="row", sharey="row")
+    for (above, below), method in zip(axes.T, methods, strict=True):
         for phi, rows in frame[frame["method"] == method].groupby("volume_fraction"):
-            spectrum, fit = (rows[rows["panel"] == panel] for panel in ("spectrum", "fit"))
-            slope, low, high = fit[["slope", "slope_low", "slope_high"]].iloc[0]
+            panels = dict(tuple(rows.groupby("panel")))
+            slope, low, high = panels["fit"][["slope", "slope_low", "slope_high"]].iloc[0]
             label = f"{phi_label(phi)}: ${slope:.2f}\\,({low:.2f},\\,{high:.2f})$"
-            ax.plot(spectrum["x"], spectrum["y"], color=phi_colour(phi), label=label)
-            ax.plot(fit["x"], fit["y"], color="k", lw=0.6, ls="--", zorder=5)
-        log_scale(ax, "xy")
-        ax.set_title(METHOD_NAMES[method])
-        ax.set_xlabel(r"wavenumber $\kappa\;[1/d_p]$")
-        ax.legend(
+            for ax, name in ((above, "density"), (below, "spectrum")):
+                ax.plot(panels[name]["x"], panels[name]["y"], color=phi_colour(phi), label=label)
+            below.plot(panels["fit"]["x"], panels["fit"]["y"], color="k", lw=0.6, ls="--", zorder=5)
+        log_scale(above, "xy")
+        log_scale(below, "xy")
+        above.set_title(METHOD_NAMES[method])
+        above.set_xlabel(FREQUENCY[units])
+        below.set_xlabel(WAVENUMBER[units])
+        below.legend(
             title=r"$\varphi$: slope (95 % interval)",
             loc="upper center",
             bbox_to_anchor=(0.5, -0.2),
@@ -55,7 +76,8 @@ def cloud_spectra(frame: pd.DataFrame) -> Figure:
             fontsize=7.5,
             title_fontsize=8,
         )
-    axes[0].set_ylabel(r"$E(\kappa)\;[v_{s,\mathrm{Stokes}}^2\, d_p]$")
+    axes[0, 0].set_ylabel(DENSITY[units])
+    axes[1, 0].set_ylabel(ENERGY[units])
     return figure
 
 

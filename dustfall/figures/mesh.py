@@ -24,11 +24,12 @@ from dustfall.units import STOKES_DRAG
 def mesh_study(frame: pd.DataFrame) -> Figure:
     """Drag on an isolated sphere against nodes: force left, relative error and order right.
 
-    `frame`: scheme, nodes, force, error, order, as `analysis.mesh_study.mesh_study_table` gives,
-    the paper's points among them. Raises ValueError for a missing column or an empty table.
+    `frame`: scheme, nodes, share, force, error, order, as `analysis.mesh_study.mesh_study_table`
+    gives, the paper's points among them. Left, the share of the nodes on the sphere stands at the
+    points of meshes with an outer sphere. Raises ValueError for a missing column or an empty table.
     """
-    require(frame, ["scheme", "nodes", "force", "error", "order"], "mesh_study")
-    figure = new_figure(DOUBLE, 3.0)
+    require(frame, ["scheme", "nodes", "share", "force", "error", "order"], "mesh_study")
+    figure = new_figure(DOUBLE, 3.4)
     left, right = figure.subplots(1, 2)
     schemes = [s for s in frame["scheme"].unique() if s != PAPER]
     looks: dict[str, dict] = {
@@ -41,6 +42,15 @@ def mesh_study(frame: pd.DataFrame) -> Figure:
         if rows.empty:
             continue
         left.plot(rows["nodes"], rows["force"], **look)
+        for row in rows[rows["share"] < 1].itertuples():
+            place = {"xytext": (6, -3), "ha": "left"} if scheme == PAPER else {"xytext": (0, -11)}
+            left.annotate(
+                f"{100 * row.share:.0f} %",
+                (row.nodes, row.force),
+                **{"ha": "center", "textcoords": "offset points"} | place,
+                fontsize=7,
+                color=look["color"],
+            )
         order = rows["order"].iloc[0]
         name = "paper (sphere and outer sphere)" if scheme == PAPER else scheme
         label = name if np.isnan(order) else f"{name}, order {order:.1f}"

@@ -5,7 +5,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from dustfall.analysis.references import PAPER_NEIGHBOURS
+from dustfall.analysis.references import PAPER_NEIGHBOURS, PAPER_WINDOW
 from dustfall.analysis.settling import STEADY
 from dustfall.figures.style import (
     DOUBLE,
@@ -28,14 +28,14 @@ NEAR_THE_PAPER = 10
 def neighbour_numbers(frame: pd.DataFrame) -> Figure:
     """Settling velocity against the number of neighbours; its excess over the paper's on the right.
 
-    `frame`: neighbours, volume_fraction, status, value, half, paper, relation, as
+    `frame`: neighbours, volume_fraction, status, value, half, as_paper, paper, relation, as
     `analysis.neighbour_numbers.neighbour_numbers_table` gives. Steady runs are filled, others
     hollow; stars are the paper's points, at the number of neighbours that it writes of. Where a
-    curve on the right crosses one, so many neighbours give the paper's velocity. Raises ValueError
-    for a missing column or an empty table.
+    curve on the right crosses one, so many neighbours give the paper's velocity; dashed, averaged
+    over the paper's window. Raises ValueError for a missing column or an empty table.
     """
-    columns = ["neighbours", "volume_fraction", "status", "value", "half", "paper", "relation"]
-    require(frame, columns, "neighbour_numbers")
+    columns = ["neighbours", "volume_fraction", "status", "value", "half", "as_paper", "paper"]
+    require(frame, [*columns, "relation"], "neighbour_numbers")
     figure = new_figure(DOUBLE, 3.3)
     left, right = figure.subplots(1, 2)
     points = frame.dropna(subset="paper").drop_duplicates("volume_fraction")
@@ -46,10 +46,12 @@ def neighbour_numbers(frame: pd.DataFrame) -> Figure:
             near = rows[rows["neighbours"] <= NEAR_THE_PAPER]
             excess = near["paper"] - 1
             _curve(right, near, (near["value"] - 1) / excess, near["half"] / excess)
+            early = (near["as_paper"] - 1) / excess
+            right.plot(near["neighbours"], early, color=phi_colour(phi), lw=0.9, ls="--")
     place = np.full(len(points), PAPER_NEIGHBOURS)
     left.plot(place, points["paper"], ls="none", marker="*", ms=8, color="k", zorder=5)
     mark_bounds(left, place, points["paper"], points["relation"])
-    right.axhline(1, color=REFERENCE, lw=0.8, ls="--", zorder=0)
+    right.axhline(1, color=REFERENCE, lw=0.8, ls=":", zorder=0)
     log_scale(left, "x")
     left.set_ylabel(r"$\langle v_s\rangle / v_{s,\mathrm{Stokes}} = 1/\beta$")
     right.set_ylabel(r"$(1/\beta - 1)$ over that of the paper")
@@ -62,6 +64,9 @@ def neighbour_numbers(frame: pd.DataFrame) -> Figure:
         for phi in sorted(frame["volume_fraction"].unique(), reverse=True)
     ]
     handles.append(Line2D([], [], color="k", ls="none", marker="*", ms=8, label="paper"))
+    if frame["as_paper"].notna().any():
+        label = rf"${PAPER_WINDOW[0]:.0f}$ to ${PAPER_WINDOW[1]:.0f}\,\tau$"
+        handles.append(Line2D([], [], color="k", lw=0.9, ls="--", label=label))
     if (frame["status"] != STEADY).any():
         handles.append(
             Line2D([], [], color="k", ls="none", marker="o", mfc="white", label="not steady")

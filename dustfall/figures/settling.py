@@ -8,6 +8,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from dustfall.analysis.settling import STEADY
+from dustfall.figures.fluctuations import ENERGY, WAVENUMBER
 from dustfall.figures.style import (
     DOUBLE,
     MARKERS,
@@ -250,14 +251,14 @@ def settling_in_time(frame: pd.DataFrame) -> Figure:
 def phase_and_spectra(frame: pd.DataFrame) -> Figure:
     """Phase diagrams of the tracked particles, a panel a volume fraction, and their spectra below.
 
-    `frame`: panel, volume_fraction, n, particle, x, y, slope, slope_error, as
+    `frame`: panel, volume_fraction, n, particle, x, y, slope, slope_error, units, as
     `analysis.spectra.phase_and_spectra` gives for one n. Orbits are drawn about the mean of each,
     at their panel's own scale, so that dilute ones show as well. Dashed: fitted power laws; the
     slope written in a panel is that of the densest case. Raises ValueError for a missing column,
     several n or fewer than two rows.
     """
     columns = ["panel", "volume_fraction", "n", "particle", "x", "y", "slope", "slope_error"]
-    require(frame, columns, "phase_and_spectra", fewest=2)
+    require(frame, [*columns, "units"], "phase_and_spectra", fewest=2)
     if frame["n"].nunique() > 1:
         raise ValueError(f"phase_and_spectra draws one n, not {frame['n'].unique().tolist()}")
     phis, particles = sorted(frame["volume_fraction"].unique()), sorted(frame["particle"].unique())
@@ -279,7 +280,8 @@ def phase_and_spectra(frame: pd.DataFrame) -> Figure:
     for ax, particle in zip(spectra, particles, strict=True):
         _spectra(ax, frame[(frame["panel"] != "phase") & (frame["particle"] == particle)])
         ax.set_title(f"particle {particle}", loc="right")
-    spectra[0].set_ylabel(r"$E(\kappa)\;[v_{s,\mathrm{Stokes}}^2\, d_p]$")
+        ax.set_xlabel(WAVENUMBER[frame["units"].iloc[0]])
+    spectra[0].set_ylabel(ENERGY[frame["units"].iloc[0]])
     letter([*orbits[: len(phis)], *spectra])
     _particle_legend(above, frame)
     phi_legend(below, phis)
@@ -314,7 +316,6 @@ def _spectra(ax, frame):
         )
         ax.text(0.04, 0.06, note, transform=ax.transAxes, fontsize=7.5)
     log_scale(ax, "xy")
-    ax.set_xlabel(r"wavenumber $\kappa\;[1/d_p]$")
 
 
 @styled

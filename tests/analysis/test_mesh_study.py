@@ -14,6 +14,7 @@ def study(error, nodes=(50, 100, 200, 400), scheme="flat", limit=24.0):
         {
             "scheme": scheme,
             "nodes": nodes,
+            "share": 1.0,
             "elements": 2 * nodes - 4,
             "force": force,
             "limit": limit,

@@ -40,6 +40,18 @@ def test_the_window_alone_is_averaged_and_the_paper_has_its_relation():
     assert table["status"].tolist()[2] == STEADY
 
 
+def test_the_papers_window_is_averaged_beside_and_a_run_that_ends_before_has_none():
+    long = run(4, 1e-3, 1.4).isel(step=slice(0, 1)).pad(step=(0, 1200), mode="edge")
+    time = 0.1 * np.arange(1201)
+    long = long.assign(
+        time=("step", time),
+        settling_velocity_mean=("step", np.where((time >= 50) & (time <= 100), 1.2, 1.4)),
+    )
+    table = neighbour_numbers_table([long, run(5, 1e-3, 1.49)], 0.0).set_index("neighbours")
+    assert table.loc[4, "as_paper"] == pytest.approx(1.2)
+    assert np.isnan(table.loc[5, "as_paper"])
+
+
 def test_each_run_may_have_a_start_of_its_own():
     runs = [run(5, 1e-3, 1.49), run(4, 1e-3, 1.42)]
     both = neighbour_numbers_table(runs, [0.0, 30.0]).set_index("neighbours")["value"]

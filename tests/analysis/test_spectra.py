@@ -7,6 +7,7 @@ import xarray as xr
 from scipy import signal
 
 from dustfall.analysis.spectra import (
+    UNITS,
     averaged_in_bins,
     cloud_spectra,
     energy_spectrum,
@@ -214,3 +215,37 @@ def test_bad_series_are_refused():
     uneven["time"][5] += 0.05
     with pytest.raises(ValueError, match="uneven"):
         phase_and_spectra([uneven], 0.0)
+
+
+@pytest.mark.parametrize("units", UNITS)
+def test_parseval_holds_in_the_units_of_the_spectra(units):
+    # A cloud of dust in air: what settles faster or slower does so in m/s.
+    run = cloud(np.random.default_rng(6).normal(1.3, 0.1, (501, 20)))
+    run.attrs |= {"diameter": 25e-6, "response_time": 4.8e-3, "settling_velocity": 0.047}
+    table = cloud_spectra([run], 0.0, units=units)
+    assert set(table["units"]) == {units}
+    velocity = -run["velocities"].values[:, :, 2] * (0.047 if units == "SI" else 1.0)
+    variance = velocity.var(axis=0).mean()
+    own = table[table["method"] == "periodogram"]
+    for panel in ("density", "spectrum"):
+        curve = own[own["panel"] == panel]
+        # Frequencies and wavenumbers are whole multiples of the first.
+        assert curve["y"].sum() * curve["x"].iloc[0] == pytest.approx(variance, rel=1e-9)
+    highest = own.loc[own["panel"] == "density", "x"].max()
+    interval = float(run["time"][1]) * (4.8e-3 if units == "SI" else 1.0)
+    assert highest == pytest.approx(250 / 501 / interval)
+
+
+def test_units_leave_the_slope_and_the_phase_alone_and_need_the_scales_of_the_run():
+    velocity = 1.3 + 0.1 * ornstein_uhlenbeck(400, 0.1)[:, None] * np.ones(3)
+    run = tracked_run(velocity)
+    with pytest.raises(ValueError, match="'diameter', which SI units need"):
+        phase_and_spectra([run], 0.0, units="SI")
+    with pytest.raises(ValueError, match="allowed: reduced, SI"):
+        phase_and_spectra([run], 0.0, units="cgs")
+    run.attrs |= {"diameter": 25e-6, "response_time": 4.8e-3, "settling_velocity": 0.047}
+    reduced, si = (phase_and_spectra([run], 0.0, units=units) for units in UNITS)
+    assert si["slope"].equals(reduced["slope"])
+    phase = si["panel"] == "phase"
+    assert si[phase][["x", "y"]].equals(reduced[phase][["x", "y"]])
+    assert not np.isclose(si["x"], reduced["x"], rtol=0.1)[~phase].any()

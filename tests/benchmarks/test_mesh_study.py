@@ -54,6 +54,13 @@ def test_each_scheme_has_its_known_error_on_an_isolated_sphere(study):
     assert abs(error.loc[0.5, QUADRATIC]) < 1e-6
 
 
+def test_the_share_tells_the_nodes_of_the_particle_from_those_of_the_outer_sphere(study):
+    nodes, share = (study.pivot(index="size", columns="scheme", values=v) for v in
+                    ("nodes", "share"))  # fmt: skip
+    np.testing.assert_allclose(share[PAPER_FORMULATION], nodes[FLAT] / nodes[PAPER_FORMULATION])
+    assert (share[FLAT] == 1).all()
+
+
 def test_paper_formulation_is_the_flat_scheme_and_a_wall(study):
     force = study.pivot(index="size", columns="scheme", values="force")
     limit = study.groupby("scheme")["limit"].first()

@@ -139,7 +139,7 @@ def phase_and_spectra():
     def panel(name, slope, x, y):
         def columns(t, phi, p):
             fields = {"panel": name, "x": x(t, phi), "y": y(t, phi)}
-            return fields | {"slope": slope, "slope_error": 0.05}
+            return fields | {"slope": slope, "slope_error": 0.05, "units": "reduced"}
 
         return waves(columns)
 
@@ -246,8 +246,8 @@ def cloud_spectra():
     for method in ("periodogram", "welch"):
         for phi in PHI:
             head = {"method": method, "volume_fraction": phi, "n": 1000}
-            found = {"slope": -2.0, "slope_low": -2.1, "slope_high": -1.9}
-            for panel in ("spectrum", "fit"):
+            found = {"slope": -2.0, "slope_low": -2.1, "slope_high": -1.9, "units": "reduced"}
+            for panel in ("density", "spectrum", "fit"):
                 tables.append(
                     pd.DataFrame(head | {"panel": panel, "x": t, "y": phi / t**2} | found)
                 )
@@ -266,7 +266,7 @@ def mesh_study():
     study = [
         pd.DataFrame(
             {"scheme": s, "nodes": nodes, "elements": 2 * nodes, "force": 24 - f / nodes}
-        ).assign(limit=24.0)
+        ).assign(limit=24.0, share=0.75 if s == "flat" else 1.0)
         for s, f in {"flat": 60.0, "projected": 2.0}.items()
     ]
     return mesh_study_table(pd.concat(study, ignore_index=True))
@@ -280,6 +280,7 @@ def neighbour_numbers():
             "status": "steady" if phi == 1e-3 else "too short",
             "value": 1 + number * phi**0.3,
             "half": 0.01,
+            "as_paper": 1 + 0.9 * number * phi**0.3,
             "paper": {1e-5: 1.0826, 1e-3: 1.39}.get(phi, np.nan),
             "relation": {1e-5: "=", 1e-3: ">="}.get(phi),
         }
@@ -439,6 +440,14 @@ def test_a_curve_crosses_one_at_the_number_of_neighbours_that_gives_the_papers_v
         assert number.max() == 5
     # The bound is an arrow, the other point none; a phi that the paper lacks has no curve.
     assert [tuple(text.xy) for text in left.texts] == [(5, 1.39)]
+
+
+def test_the_share_of_nodes_on_the_sphere_stands_at_meshes_with_an_outer_sphere():
+    left = figures.mesh_study(mesh_study()).axes[0]
+    shares = {text.xy[0]: text.get_text() for text in left.texts}
+    assert [shares[nodes] for nodes in (50, 100, 200)] == ["75 %"] * 3
+    paper = [text.get_text() for text in left.texts if text.xy[0] not in (50, 100, 200)]
+    assert paper == ["88 %", "92 %", "78 %", "77 %", "70 %", "72 %"]
 
 
 def test_paths_in_space_keep_their_heights_and_cast_their_shadows_on_the_floor():
@@ -619,6 +628,14 @@ def test_logarithmic_axes_have_whole_powers_or_plain_numbers(low, high, expected
     labels = ax.get_yticklabels() + ax.get_yticklabels(minor=True)
     shown = {t.get_text() for t in labels if low <= t.get_position()[1] <= high} - {""}
     assert shown == expected
+
+
+def test_the_axes_of_spectra_have_the_units_of_their_table():
+    for name in ("cloud_spectra", "phase_and_spectra"):
+        figure = getattr(figures, name)(TABLES[name]().assign(units="SI"))
+        labels = {ax.get_xlabel() for ax in figure.axes} | {ax.get_ylabel() for ax in figure.axes}
+        assert any("1/m" in label for label in labels)
+        assert not any("d_p" in label or "tau" in label for label in labels)
 
 
 def test_r2_and_slope_stand_in_the_panels():

@@ -139,6 +139,7 @@ rule figure_phase_and_spectra:
         statistics_from=config["sedimentation"]["statistics_from"],
         fit_frequencies=config["figures"]["fit_frequencies"],
         spectrum=config["figures"]["spectrum"],
+        units=config["figures"]["units"],
     script:
         "../scripts/figure_phase_and_spectra.py"
 
@@ -156,6 +157,7 @@ rule figure_cloud_spectra:
         library=library("figure_cloud_spectra.py"),
         starts=[plan.statistics_from(config, case) for case in SETTLED_LARGEST_CASES],
         fit_frequencies=config["figures"]["fit_frequencies"],
+        units=config["figures"]["units"],
     script:
         "../scripts/figure_cloud_spectra.py"
 

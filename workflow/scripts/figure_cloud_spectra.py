@@ -13,5 +13,5 @@ joblog.start(snakemake)
 
 params = snakemake.params
 trajectories = [xr.open_dataset(path) for path in snakemake.input.trajectories]
-table = cloud_spectra(trajectories, params.starts, params.fit_frequencies)
+table = cloud_spectra(trajectories, params.starts, params.fit_frequencies, units=params.units)
 save(draw(table), table, Path(snakemake.output.png).with_suffix(""))

@@ -14,6 +14,10 @@ joblog.start(snakemake)
 params = snakemake.params
 runs = [xr.load_dataset(path) for path in snakemake.input.series]
 table = phase_and_spectra(
-    runs, params.statistics_from, params.fit_frequencies, method=params.spectrum
+    runs,
+    params.statistics_from,
+    params.fit_frequencies,
+    units=params.units,
+    method=params.spectrum,
 )
 save(draw(table), table, Path(snakemake.output.png).with_suffix(""))
