@@ -87,7 +87,7 @@ rule study_of_neighbours:
     resources:
         checkpoint_interval=config["sedimentation"]["checkpoint_interval"],
     params:
-        library=settling_library("rotne_prager", "settle_moving_neighbours.py"),
+        library=settling_library("rotne_prager"),
         # The same start for each number.
         seed=config["seed"],
         stream=lambda wc: plan.start_stream(f"neighbours_phi{wc.phi}"),
@@ -159,7 +159,7 @@ rule study_of_moving_neighbours:
     resources:
         checkpoint_interval=config["sedimentation"]["checkpoint_interval"],
     params:
-        library=settling_library("rotne_prager"),
+        library=settling_library("rotne_prager", "settle_moving_neighbours.py"),
         # The same start for both.
         seed=config["seed"],
         stream=plan.start_stream("moving_neighbours"),
