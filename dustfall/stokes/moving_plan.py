@@ -82,11 +82,15 @@ def most_amplified(distance, radii) -> float:
 
 @njit(cache=True)
 def _choose(distance, xi, radii, tolerance, amplified, least, most):
-    """Degrees (n, n), closeness (n, n), and the root of the squares (n,) of what is left out."""
+    """Degrees (n, n), closeness (n, n), and the root of the squares (n,) of what is left out.
+
+    The share of a pair is halved until what is left out on any sphere is within the tolerance. Not
+    counted is what pairs leave out that have `most` degrees: others could not make up for it.
+    """
     n = len(radii)
     degrees = np.zeros((n, n), dtype=np.int64)
     close = np.zeros((n, n), dtype=np.bool_)
-    left = np.zeros(n)
+    left, avoidable = np.zeros(n), np.zeros(n)
     if n == 1:
         return degrees, close, left
     first, second, which = _felt(distance, xi, radii, amplified, most)
@@ -95,8 +99,7 @@ def _choose(distance, xi, radii, tolerance, amplified, least, most):
             close[i, j] = close[j, i] = min(xi[i, j], xi[j, i]) < CLOSE
     share = tolerance
     while True:
-        left[:] = 0.0
-        complete = True
+        left[:] = avoidable[:] = 0.0
         for i in range(n):
             for j in range(i):
                 degree = least if close[i, j] else 0
@@ -109,10 +112,13 @@ def _choose(distance, xi, radii, tolerance, amplified, least, most):
                         break
                     degree += 1
                 degrees[i, j] = degrees[j, i] = degree
-                complete &= degree == most
-                left[i] += (at_i + at_j) ** 2
-                left[j] += (at_i + at_j) ** 2
-        if np.max(left) <= tolerance**2 or complete or share < 1e-6 * tolerance:
+                square = (at_i + at_j) ** 2
+                left[i] += square
+                left[j] += square
+                if degree < most:
+                    avoidable[i] += square
+                    avoidable[j] += square
+        if np.max(avoidable) <= tolerance**2:
             break
         share *= 0.5
     _level_close(degrees, close)

@@ -5,6 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from dustfall.benchmarks.moving_estimates import sampled
+from dustfall.spheres import centre_distances
 from dustfall.stokes import (
     Status,
     fixed_spheres,
@@ -13,6 +14,7 @@ from dustfall.stokes import (
     resistance,
 )
 from dustfall.stokes.moving import available_memory, needed_memory
+from dustfall.stokes.moving_plan import plan_moving
 from dustfall.stokes.references.fundamental_solutions import reference_loads
 from dustfall.stokes.references.moving_pairs import loads_on_two_spheres
 from tests.stokes.clusters import triangle
@@ -295,6 +297,18 @@ def test_memory_that_is_not_there_is_not_taken(monkeypatch):
     monkeypatch.setattr("dustfall.stokes.moving.available_memory", lambda: 2**16)
     with pytest.raises(MemoryError, match=r"3 spheres take .* GiB .* only 0.0 GiB"):
         mobility(triangle(3.0), np.ones((3, 3)))
+
+
+def test_spheres_that_nearly_touch_ask_no_more_degrees_of_others():
+    """Where three spheres share more degrees than there are, others cannot make up for it."""
+    lattice = 6.0 * np.indices((3, 3, 3)).reshape(3, -1).T
+
+    def degrees(s):
+        centres = np.vstack([lattice, triangle(s) - 6.0])
+        plan = plan_moving(centre_distances(centres), np.full(30, 0.5), 1e-3, False, 4, 40)
+        return plan.degrees[:27, :27]
+
+    np.testing.assert_array_equal(degrees(2.0002), degrees(2.3))
 
 
 def test_a_million_spheres_are_refused_before_their_distances_are_taken():
