@@ -1,6 +1,6 @@
 """Spheres that move: error estimates held against errors, and what a cloud of them costs.
 
-`python -m dustfall.benchmarks.moving_estimates` prints both.
+`python -m dustfall.benchmarks.moving_estimates` prints all.
 """
 
 import time
@@ -10,6 +10,7 @@ import pandas as pd
 
 from dustfall.benchmarks.solver import random_cloud
 from dustfall.stokes.moving import mobility, needed_memory, resistance
+from dustfall.stokes.references.fundamental_solutions import reference_loads
 from dustfall.streams import Purpose, stream
 from dustfall.units import RADIUS
 
@@ -28,23 +29,22 @@ OUTPUTS = {
 }
 """What a problem is asked for, and the power of the diameter that makes it a velocity."""
 
+JUDGE = 0.3
+"""Error of the independent reference, over the tolerance of the solution that it judges."""
+
+COLUMNS = ["spheres", "gap", "tolerance", "error", "estimate", "status"]
+
 
 def sampled(number: int, tolerances=(1e-2, 1e-3, 1e-5), seed: int = 1, progress=None):
     """Estimate and error of `number` random clusters of 2 to 20 spheres, one row for each sphere.
 
-    Columns problem, cluster, spheres, gap (smallest [d_p]), tolerance, error and estimate, both as
-    `error_estimate` is, and status.
+    The truth is the solver's own at the tolerance FINE. Columns problem, cluster, spheres, gap
+    (smallest [d_p]), tolerance, error and estimate, both as `error_estimate` is, and status.
     """
     rows = []
     for item in range(number):
-        rng = stream(Purpose.MOVING_SAMPLE, seed, item)
-        centres, radii = _cluster(rng)
-        n, d = len(radii), 2.0 * radii[:, None]
-        velocity, turning = rng.standard_normal((2, n, 3)) * np.stack([np.ones_like(d), 1.0 / d])
-        if rng.random() < 0.3:
-            velocity[:], turning[:] = velocity[0], 0.0
-        gradient = rng.standard_normal((3, 3)) * (rng.random() < 0.5)
-        gradient -= np.trace(gradient) / 3.0 * np.eye(3)
+        centres, radii, velocity, turning, gradient = _moving_cluster(seed, item)
+        d = 2.0 * radii[:, None]
         for problem, given in (
             (resistance, (velocity, turning)),
             (mobility, (d * velocity, d**3 * turning)),
@@ -53,22 +53,89 @@ def sampled(number: int, tolerances=(1e-2, 1e-3, 1e-5), seed: int = 1, progress=
             exact = problem(centres, *given, **scene, tolerance=FINE)
             for tolerance in tolerances:
                 found = problem(centres, *given, **scene, tolerance=tolerance)
-                parts = [
-                    np.linalg.norm(
-                        (getattr(found, name) - getattr(exact, name)).reshape(n, -1), axis=1
-                    ) / d[:, 0] ** power
-                    for name, power in OUTPUTS[problem].items()
-                ]  # fmt: skip
-                error = np.max(parts, axis=0) / found.scale
                 rows += [
-                    (problem.__name__, item, n, found.minimum_gap, tolerance, error[i],
-                     found.error_estimate[i], str(found.status))
-                    for i in range(n)
-                ]  # fmt: skip
+                    (problem.__name__, item, *row)
+                    for row in _rows(found, exact, problem, radii, tolerance)
+                ]
         if progress is not None:
             progress(item + 1, number)
-    columns = ["problem", "cluster", "spheres", "gap", "tolerance", "error", "estimate", "status"]
-    return pd.DataFrame(rows, columns=columns)
+    return pd.DataFrame(rows, columns=["problem", "cluster", *COLUMNS])
+
+
+def judged(number: int, tolerances=(1e-2, 1e-3), seed: int = 1, progress=None):
+    """The same of `resistance` alone, by fundamental solutions, which share no code with it.
+
+    They aim at JUDGE of the smallest tolerance; where gaps are narrow and spheres many they end
+    before. One more column, reference: their own error estimate of that sphere.
+    """
+    rows = []
+    for item in range(number):
+        centres, radii, velocity, turning, gradient = _moving_cluster(seed, item)
+        scene = (centres, velocity, turning, (0.0, 0.0, 0.0), gradient, radii)
+        exact = reference_loads(*scene, tolerance=JUDGE * min(tolerances))
+        for tolerance in tolerances:
+            found = resistance(*scene, tolerance=tolerance)
+            own = exact.error_estimate
+            for row, known in zip(
+                _rows(found, exact, resistance, radii, tolerance), own, strict=True
+            ):
+                rows.append((item, *row, known))
+        if progress is not None:
+            progress(item + 1, number)
+    return pd.DataFrame(rows, columns=["cluster", *COLUMNS, "reference"])
+
+
+def coverage(table: pd.DataFrame) -> pd.DataFrame:
+    """Of loads of `judged`: how many, and the shares within the tolerance and their estimate.
+
+    One row for each tolerance and number of spheres. Loads that the reference knows to JUDGE of the
+    tolerance count, with its error estimate added to what is allowed. Columns tolerance, spheres,
+    loads, known (those that count), converged, within (of those that converged) and covered.
+    """
+    table = table.assign(
+        known=table["reference"] <= JUDGE * table["tolerance"],
+        converged=table["status"] == "converged",
+        within=table["error"] <= table["tolerance"] + table["reference"],
+        covered=table["error"] <= table["estimate"] + table["reference"],
+    )
+    rows = []
+    for (tolerance, spheres), own in table.groupby(["tolerance", "spheres"]):
+        known = own[own["known"]]
+        done = known[known["converged"]]
+        rows.append(
+            (tolerance, spheres, len(own), len(known), known["converged"].mean(),
+             done["within"].mean(), known["covered"].mean())
+        )  # fmt: skip
+    columns = "tolerance spheres loads known converged within covered"
+    return pd.DataFrame(rows, columns=columns.split())
+
+
+def _moving_cluster(seed, item):
+    """Centres, radii, velocities, angular velocities and gradient of one random cluster."""
+    rng = stream(Purpose.MOVING_SAMPLE, seed, item)
+    centres, radii = _cluster(rng)
+    n, d = len(radii), 2.0 * radii[:, None]
+    velocity, turning = rng.standard_normal((2, n, 3)) * np.stack([np.ones_like(d), 1.0 / d])
+    if rng.random() < 0.3:
+        velocity[:], turning[:] = velocity[0], 0.0
+    gradient = rng.standard_normal((3, 3)) * (rng.random() < 0.5)
+    gradient -= np.trace(gradient) / 3.0 * np.eye(3)
+    return centres, radii, velocity, turning, gradient
+
+
+def _rows(found, exact, problem, radii, tolerance) -> list[tuple]:
+    """COLUMNS of each sphere of a solution."""
+    n, d = len(radii), 2.0 * radii
+    parts = [
+        np.linalg.norm((getattr(found, name) - getattr(exact, name)).reshape(n, -1), axis=1)
+        / d**power
+        for name, power in OUTPUTS[problem].items()
+    ]
+    error = np.max(parts, axis=0) / found.scale
+    return [
+        (n, found.minimum_gap, tolerance, error[i], found.error_estimate[i], str(found.status))
+        for i in range(n)
+    ]
 
 
 def _cluster(rng) -> tuple[np.ndarray, np.ndarray]:
@@ -124,4 +191,5 @@ if __name__ == "__main__":
     groups = samples.groupby(["problem", "tolerance"])
     print(groups[["covered", "within", "converged"]].mean().to_string())
     print(groups["ratio"].describe(percentiles=[0.001, 0.01, 0.5]).to_string(float_format="%.3g"))
+    print(coverage(judged(60)).to_string(index=False, float_format="%.3g"))
     print(cost([2, 10, 30, 100, 300, 1000]).to_string(float_format="%.3g"))

@@ -55,6 +55,20 @@ rule moving_benchmark:
         "../scripts/moving_benchmark.py"
 
 
+rule moving_estimates:
+    """Errors of random clusters of moving spheres by a reference, beside the solver's estimates."""
+    output:
+        "results/benchmarks/moving_estimates.csv",
+    log:
+        "logs/benchmarks/moving_estimates.log",
+    params:
+        library=library("moving_estimates.py"),
+        seed=config["seed"],
+        scenes=config["benchmarks"]["scenes"],
+    script:
+        "../scripts/moving_estimates.py"
+
+
 rule settling_benchmark:
     """Seconds a step and memory of clouds, by their number of particles."""
     output:
