@@ -17,11 +17,10 @@ import numpy as np
 
 from dustfall.solution import Mobility, Resistance, Status
 from dustfall.spheres import (
-    centre_distances,
-    checked_centres,
     checked_flow,
     checked_gradient,
     checked_radii,
+    checked_scene,
     checked_tolerance,
     checked_vectors,
 )
@@ -183,9 +182,9 @@ def _checked_scene(centres, radii, tolerance) -> _Scene:
     n = len(np.atleast_1d(centres))
     _check_memory(n, PLAN_BYTES * n**2)
     radii = checked_radii(radii, n)
-    centres = checked_centres(centres, radii)
+    centres, distance = checked_scene(centres, radii)
     tolerance = checked_tolerance(tolerance, SMALLEST_TOLERANCE, LARGEST_TOLERANCE)
-    return _Scene(centres, radii, centre_distances(centres), tolerance)
+    return _Scene(centres, radii, distance, tolerance)
 
 
 def _undisturbed(scene, flow, gradient) -> tuple[np.ndarray, np.ndarray]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from dustfall.spheres import centre_distances, checked_centres, checked_tolerance
+from dustfall.spheres import checked_scene, checked_tolerance
 from dustfall.stokes.translation import MOST_DEGREE
 
 SMALLEST_TOLERANCE, LARGEST_TOLERANCE = 1e-8, 0.1
@@ -19,10 +19,12 @@ tolerance."""
 class Plan:
     """How many degrees of harmonics each pair of a scene exchanges.
 
-    centres: (n, 3) [d_p]. degrees: (n, n), symmetric, zero on the diagonal.
+    centres: (n, 3), distance: (n, n), of the centres, inf on the diagonal [d_p]. degrees: (n, n),
+    symmetric, zero on the diagonal.
     """
 
     centres: np.ndarray
+    distance: np.ndarray
     degrees: np.ndarray
 
 
@@ -33,9 +35,9 @@ def plan_scene(centres, tolerance: float = 1e-4) -> Plan:
     Raises ValueError for a wrong shape, values that are not finite, overlaps, or a tolerance
     outside [1e-8, 0.1].
     """
-    centres = checked_centres(centres)
+    centres, distance = checked_scene(centres)
     tolerance = checked_tolerance(tolerance, SMALLEST_TOLERANCE, LARGEST_TOLERANCE)
-    return Plan(centres, _choose_degrees(centre_distances(centres), tolerance, MOST_DEGREE))
+    return Plan(centres, distance, _choose_degrees(distance, tolerance, MOST_DEGREE))
 
 
 # What a pair leaves out, and what a sphere next to another makes of it. Degrees n of a field on a

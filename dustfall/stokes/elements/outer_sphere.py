@@ -16,9 +16,9 @@ import numpy as np
 
 from dustfall.solution import Solution, Status
 from dustfall.spheres import (
-    centre_distances,
     checked_centres,
     checked_flow,
+    checked_scene,
     checked_tolerance,
     flow_direction,
 )
@@ -119,9 +119,9 @@ def fixed_spheres_in_outer_sphere(
     its reach. Raises ValueError for what `forces_on_fixed_spheres` refuses.
     """
     tolerance = checked_tolerance(tolerance, 1e-8, 0.1)
-    centres, flow = checked_centres(centres), flow_direction(flow)
+    (centres, distance), flow = checked_scene(centres), flow_direction(flow)
     n = len(centres)
-    gap = float(centre_distances(centres).min() - CONTACT)
+    gap = float(distance.min() - CONTACT)
     if not np.any(flow):
         return Solution(np.zeros((n, 3)), np.zeros(n), 0, 0.0, gap, Status.CONVERGED)
     forces, elements = [], []

@@ -16,7 +16,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 from dustfall.solution import Solution, Status
 from dustfall.spheres import (
     centre_distances,
-    checked_centres,
+    checked_scene,
     checked_tolerance,
     flow_direction,
 )
@@ -219,9 +219,9 @@ def fixed_spheres_on_meshes(centres, flow=(0.0, 1.0, 0.0), tolerance: float = 1e
     error inf. Raises ValueError for what `forces_on_fixed_spheres` refuses.
     """
     tolerance = checked_tolerance(tolerance, 1e-8, 0.1)
-    centres, flow = checked_centres(centres), flow_direction(flow)
+    (centres, distance), flow = checked_scene(centres), flow_direction(flow)
     n = len(centres)
-    gap = float(centre_distances(centres).min() - CONTACT)
+    gap = float(distance.min() - CONTACT)
     if not np.any(flow):
         spheres, _ = mesh_scene(centres, LEVELS[0])
         still = [np.zeros((len(sphere.exchange.spread), 3)) for sphere in spheres]
