@@ -205,7 +205,7 @@ def strain(stress: pd.DataFrame) -> pd.DataFrame:
         "distances alike": "alike",
     }
     rows = []
-    for tolerance, group in stress.groupby("tolerance"):
+    for tolerance, group in stress[stress["test"] != "crowd"].groupby("tolerance"):
         gaps = group[group["test"] == "gap"]
         converged = gaps[gaps["status"] == str(Status.CONVERGED)]
         rest = group[group["test"].isin(["distance", "invariance"])]
@@ -222,6 +222,32 @@ def strain(stress: pd.DataFrame) -> pd.DataFrame:
             | rest.groupby("case")["error"].max().rename(names).to_dict()
         )
     return pd.DataFrame(rows).sort_values("tolerance", ascending=False, ignore_index=True)
+
+
+def crowds(stress: pd.DataFrame) -> pd.DataFrame:
+    """What could fool the error estimate: one row a family of scenes, over all tolerances.
+
+    over_tolerance is the largest error of the converged in tolerances, over_estimate that of all
+    over its estimate; excess, of the difference from fundamental solutions over their own estimate.
+    """
+    found = stress[stress["test"] == "crowd"]
+    converged = found["status"] == str(Status.CONVERGED)
+    found = found.assign(
+        converged=converged,
+        over_tolerance=(found["error"] / found["tolerance"]).where(converged),
+        over_estimate=found["error"] / found["estimate"],
+        excess=found["difference"] / found["peer_estimate"],
+    )
+    return found.groupby("case", sort=False, as_index=False).agg(
+        scenes=("scene", "nunique"),
+        smallest_gap=("value", "min"),
+        solves=("scene", "size"),
+        converged=("converged", "sum"),
+        over_tolerance=("over_tolerance", "max"),
+        over_estimate=("over_estimate", "max"),
+        compared=("difference", "count"),
+        excess=("excess", "max"),
+    )
 
 
 def audit(table: pd.DataFrame) -> pd.DataFrame:
@@ -593,6 +619,7 @@ TABLES: dict[str, tuple[Callable[..., pd.DataFrame], tuple[str, ...]]] = {
     "methods": (methods, (SOLVER_BENCHMARK,)),
     "spheres": (pd.DataFrame, ("results/benchmarks/spheres.csv",)),
     "strain": (strain, (STRESS,)),
+    "crowds": (crowds, (STRESS,)),
     "scenes": (scenes, ("results/dataset/summary.csv",)),
     "forces": (forces, ("results/dataset/summary.json",)),
     "scores": (scores, ("results/model/evaluation.csv", "results/model/symmetries.csv")),

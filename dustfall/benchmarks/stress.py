@@ -1,7 +1,7 @@
 """Stress tests of the solver's numerical stability: each returns a table of what it measured."""
 
 import time
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pandas as pd
@@ -16,6 +16,7 @@ from dustfall.stokes.methods import fixed_spheres
 from dustfall.stokes.multipoles import NO_CLOSE_PAIRS, apply_system, couple_scene, solve_scene
 from dustfall.stokes.plan import SMALLEST_TOLERANCE, plan_scene
 from dustfall.stokes.references.exact_pairs import forces_on_two_spheres
+from dustfall.stokes.references.fundamental_solutions import reference_forces
 from dustfall.stokes.solve import response_rows, solve
 from dustfall.stokes.translation import translation_tables
 from dustfall.streams import Purpose, stream
@@ -39,14 +40,30 @@ LURES = ((1e-2, 325.0), (1e-3, 910.0), (1e-4, 100.0), (3e-3, 25.0))
 """Gaps of a pair and distances [d_p] of spheres that squeeze it where their gradient is cut off: a
 bound without lubrication is 8 to 71 tolerances off there."""
 
-NEAR = 0.05
-"""Gap [d_p] below which the finest degrees stand for all in `crowds`."""
+NEAR_GAPS = (3e-3, 0.3)
+"""Range of the gaps [d_p] of nearly touching spheres in `crowds`, log-uniform."""
 
-_FACING = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
-"""Turns the line of a cluster from z to y."""
+FAR = (4.0, 1000.0)
+"""Range of the distances [d_p] of far spheres from them, log-uniform."""
+
+MOST_FAR = 24
+"""Largest number of far spheres."""
 
 FINE_DEGREE = 72
 """Degree of all pairs in the solve that clusters of more than two spheres are measured against."""
+
+RESOLVED = 9.0
+"""Degrees times root of the gap [d_p] that leave out 1e-11: harmonics n fade as exp(-n xi) each
+way, cosh(xi) the distance."""
+
+PEER_SPHERES, PEER_GAP = 27, 0.05
+"""Most spheres and least gap [d_p] of the scenes that fundamental solutions answer in seconds."""
+
+PEER_TOLERANCE = 1e-7
+"""That they are asked for."""
+
+PEER_SCENES = 0.1
+"""Share of the scenes of a family, at least one, that they answer too, where they can."""
 
 
 def gaps(tolerances, sizes=(1.0, 0.1, 1e-2, 1e-3, 1e-4), progress=None):
@@ -73,66 +90,161 @@ def gaps(tolerances, sizes=(1.0, 0.1, 1e-2, 1e-3, 1e-4), progress=None):
     return pd.DataFrame(rows)
 
 
-def crowds(tolerances, progress=None) -> pd.DataFrame:
+def crowds(tolerances, number: int, seed: int = 1, progress=None) -> pd.DataFrame:
     """What could fool the error estimate: columns as in `gaps`, value the smallest gap [d_p].
 
-    Nearly touching pairs and triples among far spheres that strain the flow at them, lattices, a
-    chain, two clusters apart and a compact one; each against a solve with more degrees.
+    `number` random scenes of the families that have a share of 1 in FAMILIES, of others in
+    proportion, at least one, and those of LURES; each against a solve with more degrees. scene:
+    number within the family. spheres: how many. difference: of that solve and of fundamental
+    solutions, which share no code with it, over 24, and peer_estimate: the error that these
+    estimate of themselves; both where they answer, on the row of the first tolerance.
     """
-    rows, scenes = [], list(_crowds())
-    for name, centres in scenes:
+    rows = []
+    scenes = list(_crowds(number, seed))
+    for case, item, peer, centres in scenes:
         exact = fine_forces(centres, FLOW, _fine_degrees(centres))
         gap = centre_distances(centres).min() - CONTACT
+        compared = {}
+        if peer and len(centres) <= PEER_SPHERES and gap >= PEER_GAP:
+            forces, estimate = reference_forces(centres, FLOW, PEER_TOLERANCE)
+            difference = np.abs(forces - exact).max() / STOKES_DRAG
+            compared = {"difference": difference, "peer_estimate": estimate}
         for tolerance in tolerances:
-            row = {"test": "crowd", "case": name, "value": gap}
-            rows.append(row | _solved(centres, exact, tolerance))
+            row = {"test": "crowd", "case": case, "value": gap}
+            row |= {"scene": item, "spheres": len(centres)}
+            rows.append(row | _solved(centres, exact, tolerance) | compared)
+            compared = {}
             if progress is not None:
                 progress(len(rows), len(scenes) * len(tolerances))
     return pd.DataFrame(rows)
 
 
-def _crowds():
-    """Names and centres (n, 3) [d_p] of the scenes of `crowds`."""
-    for gap, distance in LURES:
-        near = (CONTACT + gap) * CLUSTERS["pair"] @ _FACING
-        yield "pair and a square far off", np.vstack([near, _square(distance)])
-    for item, (number, distance) in enumerate(((1, 5.0), (4, 20.0), (24, 60.0))):
-        rng = stream(Purpose.STRESS, 1, CROWDS, item)
-        for name in ("pair", "chain of three"):
-            near = 1.003 * CLUSTERS[name] @ _FACING
-            yield f"{name} among {number} far", np.vstack([near, _ring(number, distance, rng)])
-    for side, spacing in ((3, 1.5), (5, 60.0)):
-        axis = spacing * np.arange(side)
-        yield f"lattice of {side**3}", np.array(np.meshgrid(axis, axis, axis)).reshape(3, -1).T
-    yield "chain of 20", 1.1 * np.arange(20.0)[:, None] * [0.0, 1.0, 0.0]
-    six = 1.05 * CLUSTERS["six"]
-    yield "two clusters apart", np.vstack([six, six + np.array([3.0, 12.0, 4.0])])
-    # A sphere and its twelve neighbours in the closest packing.
+def _crowds(number: int, seed: int):
+    """Family, number, whether fundamental solutions are asked too, and centres (n, 3) [d_p]."""
+    for item, (gap, distance) in enumerate(LURES):
+        near = _line([gap])
+        yield "lure", item, False, np.vstack([near, _patch(16, distance) @ _along_flow().T])
+    for family, (name, (share, scene)) in enumerate(FAMILIES.items()):
+        count = max(round(share * number), 1)
+        for item in range(count):
+            rng = stream(Purpose.STRESS, seed, CROWDS, family, item)
+            yield name, item, item < max(PEER_SCENES * count, 1), scene(rng)
+
+
+def _among_far(rng, spheres: int) -> np.ndarray:
+    """Nearly touching spheres, and far ones anywhere."""
+    return _with_far(rng, _grown(rng, spheres, NEAR_GAPS))
+
+
+def _among_lures(rng, spheres: int) -> np.ndarray:
+    """Nearly touching spheres on a line along the flow; far ones side by side, which squeeze it.
+
+    They lie on the line, where the gradient of their flow is largest, or anywhere.
+    """
+    near = _line(_log_uniform(rng, NEAR_GAPS, spheres - 1))
+    # From there on the patch is beyond the line's end, and its spheres do not overlap.
+    distance = _log_uniform(rng, (15.0, FAR[1]))
+    turn = _along_flow() if rng.random() < 0.5 else _turn(rng)
+    return np.vstack([near, _patch(rng.integers(1, MOST_FAR + 1), distance) @ turn.T])
+
+
+def _lattice(rng, side: int, spacings) -> np.ndarray:
+    """side^3 spheres on a cubic lattice, turned."""
+    axis = _log_uniform(rng, spacings) * np.arange(side)
+    return np.array(np.meshgrid(axis, axis, axis)).reshape(3, -1).T @ _turn(rng).T
+
+
+def _chain(rng, spheres: int, gaps) -> np.ndarray:
+    """Spheres on a line, one gap between all, turned."""
+    return _line(np.full(spheres - 1, _log_uniform(rng, gaps))) @ _turn(rng).T
+
+
+def _two_clusters(rng) -> np.ndarray:
+    """Two clusters of four to six spheres, some distance apart."""
+    one, other = (_grown(rng, rng.integers(4, 7), (0.05, 0.5)) for _ in range(2))
+    # No cluster reaches further than its spheres in a row.
+    return np.vstack([one, other + (18.0 + _log_uniform(rng, (1.0, 200.0))) * _turn(rng)[0]])
+
+
+def _thirteen(rng) -> np.ndarray:
+    """A sphere and its twelve neighbours in the closest packing, a gap of 0.02 apart, turned."""
     twelve = [np.roll([0.0, a, b], k) for a in (-1, 1) for b in (-1, 1) for k in range(3)]
-    yield "thirteen", 1.02 * np.vstack([np.zeros((1, 3)), np.sqrt(0.5) * np.array(twelve)])
+    return 1.02 * np.vstack([np.zeros((1, 3)), np.sqrt(0.5) * np.array(twelve)]) @ _turn(rng).T
 
 
-def _square(distance: float) -> np.ndarray:
-    """4 x 4 spheres on a square, a tenth of `distance` apart, across the line to the origin."""
-    x, z = 0.1 * distance * (np.mgrid[:4, :4].reshape(2, -1) - 1.5)
-    return np.column_stack([x, np.full(16, distance), z])
+FAMILIES = {
+    "pair among far": (1.0, partial(_among_far, spheres=2)),
+    "triple among far": (1.0, partial(_among_far, spheres=3)),
+    "pair among lures": (1.0, partial(_among_lures, spheres=2)),
+    "triple among lures": (1.0, partial(_among_lures, spheres=3)),
+    "two clusters": (0.5, _two_clusters),
+    "lattice of 27": (0.3, partial(_lattice, side=3, spacings=(1.2, 100.0))),
+    "chain of 20": (0.2, partial(_chain, spheres=20, gaps=(0.1, 10.0))),
+    "lattice of 125": (0.1, partial(_lattice, side=5, spacings=(5.0, 100.0))),
+    "thirteen": (0.01, _thirteen),
+}
+"""Families of `crowds`: share of the number of scenes, which is smaller for what takes longer, and
+what draws a scene."""
 
 
-def _ring(number: int, distance: float, rng) -> np.ndarray:
-    """Random spheres, `distance` to twice that far from the origin, 2 d_p from one another."""
-    placed = np.empty((0, 3))
-    while len(placed) < number:
-        place = distance * rng.uniform(1.0, 2.0) * Rotation.random(rng=rng).as_matrix()[0]
-        if (np.linalg.norm(placed - place, axis=1) > 2.0).all():
-            placed = np.vstack([placed, place])
-    return placed
+def _grown(rng, spheres: int, gaps) -> np.ndarray:
+    """Spheres that each nearly touch one that is there already."""
+    centres = np.zeros((1, 3))
+    while len(centres) < spheres:
+        apart = CONTACT + _log_uniform(rng, gaps)
+        candidate = centres[rng.integers(len(centres))] + apart * _turn(rng)[0]
+        if np.linalg.norm(centres - candidate, axis=1).min() >= CONTACT + gaps[0]:
+            centres = np.vstack([centres, candidate])
+    return centres
+
+
+def _with_far(rng, near) -> np.ndarray:
+    """Far spheres, 1 to MOST_FAR, around near ones, at least 2 d_p from any."""
+    centres, spheres = near, len(near) + rng.integers(1, MOST_FAR + 1)
+    while len(centres) < spheres:
+        candidate = _log_uniform(rng, FAR) * _turn(rng)[0]
+        if np.linalg.norm(centres - candidate, axis=1).min() > 2.0:
+            centres = np.vstack([centres, candidate])
+    return centres
+
+
+def _line(gaps) -> np.ndarray:
+    """Spheres on a line along the flow, the first at the origin, these gaps [d_p] apart."""
+    places = np.concatenate([[0.0], np.cumsum(CONTACT + np.asarray(gaps))])
+    return places[:, None] * FLOW
+
+
+def _patch(number: int, distance: float) -> np.ndarray:
+    """Spheres on a square across the x axis, a tenth of `distance` apart, at x = `distance`."""
+    side = int(np.ceil(np.sqrt(number)))
+    places = 0.1 * distance * (np.mgrid[:side, :side].reshape(2, -1).T[:number] - 0.5 * (side - 1))
+    return np.column_stack([np.full(number, distance), places])
+
+
+def _along_flow() -> np.ndarray:
+    """A matrix (3, 3) that turns x into the flow."""
+    across = np.cross(FLOW, [0.0, 0.0, 1.0])
+    across /= np.linalg.norm(across)
+    return np.column_stack([FLOW, across, np.cross(FLOW, across)])
+
+
+def _turn(rng) -> np.ndarray:
+    """A random rotation (3, 3)."""
+    return Rotation.random(rng=rng).as_matrix()
+
+
+def _log_uniform(rng, limits, size=None):
+    """A number between two limits, its logarithm uniform."""
+    return np.exp(rng.uniform(*np.log(limits), size))
 
 
 def _fine_degrees(centres) -> np.ndarray:
-    """Degrees beyond those of the strictest tolerance; the highest for nearly touching pairs."""
-    degrees = np.minimum(plan_scene(centres, SMALLEST_TOLERANCE).degrees + 4, FINE_DEGREE)
-    degrees[centre_distances(centres) < CONTACT + NEAR] = FINE_DEGREE
-    return degrees
+    """Degrees beyond those of the strictest tolerance, and those that resolve each gap."""
+    degrees = plan_scene(centres, SMALLEST_TOLERANCE).degrees + 4
+    gaps = np.maximum(centre_distances(centres) - CONTACT, 1e-9)
+    return np.minimum(np.maximum(degrees, np.ceil(RESOLVED / np.sqrt(gaps))), FINE_DEGREE).astype(
+        int
+    )
 
 
 def distances(tolerances, values=(10.0, 100.0, 1e3, 1e4)) -> pd.DataFrame:

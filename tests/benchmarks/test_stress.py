@@ -1,9 +1,12 @@
 """The stress tests measure against truths, and the solver's word on its error holds."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 from dustfall.benchmarks import stress
+from dustfall.spheres import checked_centres
 from dustfall.stokes.references.exact_pairs import forces_on_two_spheres
 
 
@@ -25,18 +28,37 @@ def test_every_gap_is_within_tolerance_or_says_that_it_is_not(monkeypatch):
 
 def test_no_crowd_fools_the_error_estimate(monkeypatch):
     monkeypatch.setattr(stress, "FINE_DEGREE", 40)
+    monkeypatch.setattr(stress, "PEER_SPHERES", 0)
     monkeypatch.setattr(stress, "LURES", stress.LURES[:3])
-    few = [
-        (name, centres)
-        for name, centres in stress._crowds()
-        if "square" in name or "far" in name or name == "lattice of 125"
-    ]
-    monkeypatch.setattr(stress, "_crowds", lambda: few)
-    table = stress.crowds((1e-3, 1e-4, 1e-5))
+    few = {
+        name: stress.FAMILIES[name] for name in stress.FAMILIES if "far" in name or "lure" in name
+    }
+    few["lattice of 125"] = (1.0, partial(stress._lattice, side=5, spacings=(60.0, 60.0)))
+    monkeypatch.setattr(stress, "FAMILIES", few)
+    table = stress.crowds((1e-3, 1e-4, 1e-5), number=1)
+    assert len(table) == 3 * (3 + len(few))
     converged = table["status"] == "converged"
     assert converged.all()
     assert (table["error"] <= table["tolerance"]).all()
     assert (table["error"] <= table["estimate"]).all()
+
+
+@pytest.mark.parametrize("name", stress.FAMILIES)
+def test_scenes_of_every_family_are_drawn_without_contact_and_again(name):
+    _, scene = stress.FAMILIES[name]
+    centres, again, other = (scene(np.random.default_rng(seed)) for seed in (1, 1, 2))
+    checked_centres(centres)
+    np.testing.assert_array_equal(centres, again)
+    assert not np.array_equal(centres, other)
+
+
+def test_a_method_that_shares_no_code_agrees_with_what_crowds_are_measured_against(monkeypatch):
+    monkeypatch.setattr(stress, "LURES", ())
+    scene = np.array([[0.0, 0.0, 0.0], [1.3, 0.2, 0.0], [0.0, 5.0, 3.0]])
+    monkeypatch.setattr(stress, "FAMILIES", {"three": (1.0, lambda rng: scene)})
+    row = stress.crowds((1e-4,), number=1).iloc[0]
+    assert row["spheres"] == 3
+    assert row["difference"] <= row["peer_estimate"] <= 1e-7
 
 
 def test_pairs_far_apart_are_exact_to_the_tolerance():

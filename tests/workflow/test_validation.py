@@ -49,11 +49,24 @@ STRESS = pd.DataFrame(
     columns=["test", "case", "value", "tolerance", "seconds", "error", "estimate", "status"],
 )
 
+CROWDS = pd.DataFrame(
+    [
+        ("crowd", "pair", 0, 0.02, 1e-4, 4e-5, 8e-5, "converged", 2e-9, 4e-9),
+        ("crowd", "pair", 0, 0.02, 1e-8, 3e-8, 4e-8, "out of reach", None, None),
+        ("crowd", "pair", 1, 0.10, 1e-4, 2e-5, 8e-5, "converged", None, None),
+        ("crowd", "lattice", 0, 1.0, 1e-4, 5e-5, 6e-5, "converged", None, None),
+    ],
+    columns=[
+        "test", "case", "scene", "value", "tolerance", "error", "estimate", "status", "difference",
+        "peer_estimate",
+    ],
+)  # fmt: skip
+
 
 @pytest.fixture
 def benchmarked(tmp_path) -> Path:
     """A folder as a campaign leaves it that ran the benchmark of the solver alone."""
-    for file, table in {"solver": SOLVER, "stress": STRESS}.items():
+    for file, table in {"solver": SOLVER, "stress": pd.concat([STRESS, CROWDS])}.items():
         path = tmp_path / f"results/benchmarks/{file}.csv"
         path.parent.mkdir(parents=True, exist_ok=True)
         table.to_csv(path, index=False)
@@ -161,6 +174,7 @@ def test_a_table_without_its_source_is_left_out_and_a_former_one_removed(benchma
         "random_scenes",
         "methods",
         "strain",
+        "crowds",
         "run_times",
         "oseen",
     }
@@ -189,11 +203,23 @@ def test_reduced_tables_keep_the_worst_of_what_they_reduce():
     row = validation.random_scenes(SOLVER).iloc[0]
     assert (row["error_max"], row["covered"], row["scenes"]) == (4e-3, 0.98, 150)
     assert (row["fastest"], row["slowest"]) == (0.4, 2.2)
-    row = validation.strain(STRESS).iloc[0]
+    strained = validation.strain(pd.concat([STRESS, CROWDS]))
+    assert len(strained) == 1
+    row = strained.iloc[0]
     assert (row["clusters"], row["converged"], row["smallest_gap"]) == (2, 1, 0.1)
     # What is out of reach has no part in the error of the converged, but in what is covered.
     assert (row["error_max"], row["covered"]) == (1e-6, 0.5)
     assert row[["apart", "moved", "turned", "alike"]].tolist() == [1e-5, 1e-8, 2e-7, 3e-7]
+
+
+def test_crowds_keep_the_worst_of_each_family():
+    pair, lattice = validation.crowds(CROWDS).to_dict("records")
+    assert (pair["scenes"], pair["solves"], pair["converged"]) == (2, 3, 2)
+    assert (pair["smallest_gap"], pair["compared"], lattice["compared"]) == (0.02, 1, 0)
+    # What is out of reach may miss its tolerance, but not its estimate.
+    assert pair["over_tolerance"] == pytest.approx(0.4)
+    assert pair["over_estimate"] == pytest.approx(0.75)
+    assert pair["excess"] == pytest.approx(0.5)
 
 
 def test_methods_stand_side_by_side_in_the_two_hardest_sets():

@@ -88,13 +88,15 @@ rule settling_benchmark:
 
 
 rule stress:
-    """Gaps, distances, turns and condition numbers that strain the solver."""
+    """Gaps, crowds, distances, turns and condition numbers that strain the solver."""
     output:
         "results/benchmarks/stress.csv",
     log:
         "logs/benchmarks/stress.log",
     params:
         library=library("stress.py"),
+        seed=config["seed"],
         tolerances=config["benchmarks"]["tolerances"],
+        crowds=config["benchmarks"]["crowds"],
     script:
         "../scripts/stress.py"
