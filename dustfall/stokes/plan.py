@@ -143,12 +143,27 @@ def _sums(distance, xi, sources, highest):
 
 
 @njit(cache=True)
-def _left_out(distance, xi, sources, sums, degrees):
+def _of_pair(i, j):
+    """Where pair i, j is in an array of all pairs."""
+    return i * (i - 1) // 2 + j if i > j else j * (j - 1) // 2 + i
+
+
+@njit(cache=True)
+def _put_pair(degree, xi, gap, pair):
+    """Write what `_left_out` wants of a pair: pair (4,)."""
+    pair[0], pair[1] = missing_velocity(degree, xi), pushed(degree + 1, xi, gap)
+    pair[2], pair[3] = uniform_error(degree, xi), strained_error(degree, xi)
+
+
+@njit(cache=True)
+def _left_out(distance, xi, sources, sums, degrees, pairs):
     """Error (n,) of each sphere's own force by the degrees that pairs do not exchange.
 
-    Degree t = degrees[i, j] + 1 is the first that j's field lacks on i. It would push whatever is
-    next to i, and i itself by its echo; and j's own traction of that degree, which all others make,
-    does not reach i. All are added, as they may add.
+    pairs: (n (n - 1) / 2, 4), of each pair at its degree t - 1 `missing_velocity`, `pushed` at t,
+    `uniform_error` and `strained_error`.
+    Degree t is the first that j's field lacks on i. It would push whatever is next to i, and i
+    itself by its echo; and j's own traction of that degree, which all others make, does not reach
+    i. All are added, as they may add.
     """
     _, echoes, tractions, strains = sums
     n, columns = echoes.shape
@@ -156,16 +171,14 @@ def _left_out(distance, xi, sources, sums, degrees):
     for i in range(n):
         for j in range(n):
             if j != i:
-                degree, d = degrees[i, j], distance[i, j]
-                t = degree + 1
+                t, d = degrees[i, j] + 1, distance[i, j]
                 highest = max(highest, t)
-                velocity = missing_velocity(degree, xi[i, j])
-                push = pushed(t, xi[i, j], d - 1.0)
+                velocity, push, uniform, strained = pairs[_of_pair(i, j)]
                 source = sources[i, j]
                 missing[i, t] += source * velocity
                 around = max(max(strains[i], strains[j]) - source * strain(d), 0.0)
-                out[i] += sources[j, i] * uniform_error(degree, xi[i, j])
-                out[i] += around * strained_error(degree, xi[i, j])
+                out[i] += sources[j, i] * uniform
+                out[i] += around * strained
                 out[i] += source * velocity * max(echoes[i, t] - echo(d) * push, 0.0)
                 traction = tractions[j, t] - sources[j, i] * min(push, held(t))
                 out[i] += velocity * max(traction, 0.0)
@@ -229,9 +242,14 @@ def error_bound(centres, distance, degrees, force):
     xi = np.arccosh(distance)
     sources = _sources(centres, distance, force)
     sums = _sums(distance, xi, sources, np.max(degrees))
-    own = _left_out(distance, xi, sources, sums, degrees)
-    screen = np.empty(len(own))
-    for i in range(len(own)):
+    n = len(distance)
+    pairs = np.empty((n * (n - 1) // 2, 4))
+    for i in range(n):
+        for j in range(i):
+            _put_pair(degrees[i, j], xi[i, j], distance[i, j] - 1.0, pairs[_of_pair(i, j)])
+    own = _left_out(distance, xi, sources, sums, degrees, pairs)
+    screen = np.empty(n)
+    for i in range(n):
         screen[i] = min(1.5 * np.sqrt(np.sum(force[i] ** 2)), 1.0)
     return _felt_by_others(distance, own, screen)
 
@@ -253,6 +271,8 @@ def _choose_degrees(distance, tolerance, most):
             if j != i:
                 screen[i] += 0.5 / distance[i, j]
     screen = 1.0 / (1.0 + screen)
+    # What a pair leaves out changes with its degree alone, and few change from share to share.
+    pairs = np.empty((n * (n - 1) // 2, 4))
     share, left = tolerance, np.full((n, n), np.inf)
     while True:
         complete = True
@@ -262,16 +282,16 @@ def _choose_degrees(distance, tolerance, most):
                 while left[i, j] > share and degrees[i, j] < most:
                     degree = degrees[i, j] + (0 if left[i, j] == np.inf else 1)
                     t = degree + 1
-                    own = pushed(t, xi[i, j], distance[i, j] - 1.0)
+                    pair = pairs[_of_pair(i, j)]
+                    _put_pair(degree, xi[i, j], distance[i, j] - 1.0, pair)
+                    velocity, own, uniform, strained = pair
                     others = max(pushes[i, t], pushes[j, t]) - own
                     others += max(tractions[i, t], tractions[j, t]) - min(own, held(t))
                     around = max(max(strains[i], strains[j]) - strain(distance[i, j]), 0.0)
-                    left[i, j] = missing_velocity(degree, xi[i, j]) * max(others, 0.0)
-                    left[i, j] += uniform_error(degree, xi[i, j])
-                    left[i, j] += around * strained_error(degree, xi[i, j])
+                    left[i, j] = velocity * max(others, 0.0) + uniform + around * strained
                     degrees[i, j] = degrees[j, i] = degree
                 complete &= degrees[i, j] == most
-        own = _left_out(distance, xi, sources, sums, degrees)
+        own = _left_out(distance, xi, sources, sums, degrees, pairs)
         error = np.max(_felt_by_others(distance, own, screen))
         if error <= 0.9 * tolerance or complete or share < 1e-6 * tolerance:
             return degrees
