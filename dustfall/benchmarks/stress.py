@@ -1,6 +1,7 @@
 """Stress tests of the solver's numerical stability: each returns a table of what it measured."""
 
 import time
+from collections.abc import Callable
 from functools import cache, partial
 
 import numpy as np
@@ -172,7 +173,7 @@ def _thirteen(rng) -> np.ndarray:
     return 1.02 * np.vstack([np.zeros((1, 3)), np.sqrt(0.5) * np.array(twelve)]) @ _turn(rng).T
 
 
-FAMILIES = {
+FAMILIES: dict[str, tuple[float, Callable[..., np.ndarray]]] = {
     "pair among far": (1.0, partial(_among_far, spheres=2)),
     "triple among far": (1.0, partial(_among_far, spheres=3)),
     "pair among lures": (1.0, partial(_among_lures, spheres=2)),
