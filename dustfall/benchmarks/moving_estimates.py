@@ -72,8 +72,8 @@ def sampled(number: int, tolerances=(1e-2, 1e-3, 1e-5), seed: int = 1, progress=
 def judged(number: int, tolerances=(1e-2, 1e-3), seed: int = 1, progress=None):
     """The same of `resistance` alone, by fundamental solutions, which share no code with it.
 
-    They aim at JUDGE of the smallest tolerance, for clusters of KNOWN_NUMBERS; where gaps are narrow
-    they end before. One more column, reference: their own error estimate of that sphere.
+    They aim at JUDGE of the smallest tolerance, for clusters of KNOWN_NUMBERS; where gaps are
+    narrow they end before. One more column, reference: their own error estimate of that sphere.
     """
     rows = []
     for item in range(number):

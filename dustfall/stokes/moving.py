@@ -58,8 +58,8 @@ LEVELS = (
 leaves out by the rule of `moving_plan` is the estimate."""
 
 SAFETY = 3.0
-"""Of the error estimate over the change of levels: at 2, `benchmarks.moving_estimates` finds 2 of 35
-loads above their estimate at a tolerance of 1e-2, by up to a tenth."""
+"""Of the error estimate over the change of levels: at 2, `benchmarks.moving_estimates` finds 2 of
+35 loads above their estimate at a tolerance of 1e-2, by up to a tenth."""
 
 FIRST_GOAL = 10.0
 """Residual of the first level, over that of the others."""
