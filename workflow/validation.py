@@ -58,6 +58,7 @@ PICTURES = {
             "neighbour_numbers",
             "predicted_vs_target",
             "scene_meshes",
+            "sketches",
             "trajectories",
             "trajectories_3d",
             "trajectories_all_particles",

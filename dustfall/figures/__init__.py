@@ -21,6 +21,7 @@ from dustfall.figures.settling import (
     trajectories,
     trajectories_3d,
 )
+from dustfall.figures.sketches import sketches
 from dustfall.figures.style import save
 from dustfall.figures.voronoi import voronoi_pdf, voronoi_variance
 
@@ -42,6 +43,7 @@ __all__ = [
     "predicted_vs_target",
     "save",
     "settling_in_time",
+    "sketches",
     "spearman",
     "trajectories",
     "trajectories_3d",

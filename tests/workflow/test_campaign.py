@@ -17,7 +17,7 @@ SMOKE = ("--configfile", "config/smoke.yaml")
 def test_every_figure_is_there_with_its_numbers(campaign):
     folder = campaign.folder / "results/figures"
     pictures = sorted(folder.glob("*.png"))
-    assert len(pictures) == 22
+    assert len(pictures) == 23
     for picture in pictures:
         assert picture.read_bytes().startswith(b"\x89PNG")
         assert picture.with_suffix(".pdf").read_bytes().startswith(b"%PDF")

@@ -33,6 +33,7 @@ FIGURES = [
     "mesh_study",
     "audit",
     "scene_meshes",
+    "sketches",
 ]
 
 

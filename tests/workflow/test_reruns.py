@@ -26,7 +26,8 @@ AUDIT = {"audit": 1, "figure_audit": 1}
 DATA_FIGURES = {"figure_force_scatter": 1, "figure_force_pdf": 1, "figure_spearman": 1}
 SCORES = {"evaluation": 1, "figure_predicted_vs_target": 1, "figure_error_by_distance": 1}
 TRIALS = {"trial": 13, "learning_curve": 1, "ablation": 1, "figure_learning_curve": 1}
-MODELS = {"sweep": 4, "winner": 1, "model": 5, **SCORES, **TRIALS}
+SKETCHES = {"figure_sketches": 1}
+MODELS = {"sweep": 4, "winner": 1, "model": 5, **SCORES, **TRIALS, **SKETCHES}
 STEADY_TABLE = {
     "steady_state": 1,
     "independence_of_n": 1,
@@ -131,7 +132,7 @@ def changed_themselves(words: str) -> set[str]:
         ("idnn={layers_of: {dense: 30-30}}", {"model": 1, **SCORES}),
         (
             "idnn={layers: [10/10, 20-20/20-20, 5/5]}",
-            {"sweep": 2, "winner": 1, "model": 1} | SCORES | SETTLING,
+            {"sweep": 2, "winner": 1, "model": 1} | SCORES | SKETCHES | SETTLING,
         ),
         (
             "idnn={laws_of: {anchored: [uniform]}}",

@@ -378,3 +378,18 @@ rule figure_scene_meshes:
         tolerance=config["stokes"]["tolerance"],
     script:
         "../scripts/figure_scene_meshes.py"
+
+
+rule figure_sketches:
+    """Sketches of a scene, of the IDNN and of a particle's own frame."""
+    input:
+        model="results/model/idnn.safetensors",
+    output:
+        **figure("sketches", "Force models"),
+    log:
+        "logs/figures/sketches.log",
+    localrule: True
+    params:
+        library=library("figure_sketches.py"),
+    script:
+        "../scripts/figure_sketches.py"
