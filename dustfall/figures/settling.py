@@ -225,9 +225,8 @@ def settling_in_time(frame: pd.DataFrame) -> Figure:
             mean.plot(rows[clock], rows["mean"], color=colour, lw=1)
             # Before that particles still follow their start and not the cloud.
             later = rows[rows["time"] >= min(ADAPTED, rows["time"].max() / 2)]
-            if not later.empty:
-                gained = 100 * (later["mean"] / later["mean"].iloc[0] - 1)
-                change.plot(later[clock], gained, color=colour, lw=1)
+            gained = 100 * (later["mean"] / later["mean"].iloc[0] - 1)
+            change.plot(later[clock], gained, color=colour, lw=1)
             # It has no variance either, and a logarithmic axis no zero.
             positive = rows["variance"].where(rows["variance"] > 0)
             variance.plot(rows[clock], positive, color=colour, lw=1)
