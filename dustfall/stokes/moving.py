@@ -314,7 +314,8 @@ def _solved(scene, amplified, response, right, measured, units, scale) -> tuple:
             estimate /= own
             if residual > goal or estimate.max() <= scene.tolerance:
                 break
-            if plan.degrees.max() == MOST_DEGREE:
+            # What is left out then, no finer level brings back.
+            if plan.degrees.max() == MOST_DEGREE or plan.unresolved.max() > scene.tolerance:
                 break
         coarser = finer
     if residual > goal or not np.isfinite(moments).all():

@@ -163,7 +163,7 @@ def test_crowds_feel_what_fundamental_solutions_find(n, mixed, seed):
 
 
 def test_estimates_cover_the_errors_of_random_clusters():
-    samples = sampled(4, tolerances=(1e-2, 1e-4), seed=3)
+    samples = sampled(3, tolerances=(1e-2, 1e-4), seed=3)
     converged = samples[samples["status"] == "converged"]
     assert len(converged) > 0.95 * len(samples)
     assert (converged["error"] <= converged["tolerance"]).all()
@@ -316,9 +316,11 @@ def test_a_million_spheres_are_refused_before_their_distances_are_taken():
         mobility(np.zeros((1_000_000, 3)), np.zeros((1_000_000, 3)))
 
 
-def test_a_gap_beyond_the_last_degree_is_no_convergence():
+def test_a_gap_beyond_the_last_degree_is_no_convergence(monkeypatch):
+    """With as many degrees as there are, that is 1e-7; with a tenth of them it is soon over."""
     # Approach: 1 / (2 gap) + 9/20 log(1 / gap) + 1.346, the gap in radii (Kim and Karrila 1991).
-    gap = 1e-7
+    monkeypatch.setattr("dustfall.stokes.moving_plan.MOST_ELIMINATED", 2_000)
+    gap = 1e-5
     found = resistance([[0, 0, 0], [0, 0, 1 + gap]], [[0, 0, 1], [0, 0, -1]], tolerance=1e-4)
     exact = 0.25 / gap - 0.45 * np.log(2 * gap) + 1.346
     assert abs(found.force[1, 2] - exact) <= found.error_estimate[1] * found.scale[1]
