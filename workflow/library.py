@@ -75,7 +75,7 @@ def _imported(path: Path) -> Iterator[Path]:
     if path.name == "__init__.py" and "iter_modules" in _names(path):
         # A package that looks for its modules itself has them all.
         yield from (module for module in path.parent.glob("*.py") if module != path)
-    for node in ast.walk(_tree(path)):
+    for node in _statements(_tree(path)):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 yield from _module(alias.name) or _shared(alias.name)
@@ -119,6 +119,14 @@ def _names(path: Path) -> frozenset[str]:
         else:
             names |= {part.id for part in ast.walk(node) if isinstance(part, ast.Name)}
     return frozenset(names)
+
+
+def _statements(node: ast.AST) -> Iterator[ast.AST]:
+    """All statements below a node, without a walk through their expressions: most of a tree."""
+    for child in ast.iter_child_nodes(node):
+        if not isinstance(child, ast.expr):
+            yield child
+            yield from _statements(child)
 
 
 @cache
