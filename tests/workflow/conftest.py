@@ -17,10 +17,23 @@ class Project:
 
     def __init__(self, folder: Path):
         self.folder = folder
-        for name in ("config", "docs", "dustfall", "profiles", "workflow"):
+        for name in ("config", "docs", "profiles", "workflow"):
             shutil.copytree(ROOT / name, folder / name)
+        shutil.copytree(
+            ROOT / "dustfall", folder / "dustfall", ignore=shutil.ignore_patterns("__pycache__")
+        )
+        self._share_kernels()
         shutil.copy2(ROOT / "Snakefile", folder)
         self.rules: set[str] = set()
+
+    def _share_kernels(self) -> None:
+        """Compile what numba compiles once, here or there: what a test edits is compiled anew."""
+        for source in ROOT.glob("dustfall/**/*.py"):
+            cache = source.parent / "__pycache__"
+            cache.mkdir(exist_ok=True)
+            own = self.folder / cache.relative_to(ROOT)
+            if not own.exists():
+                own.symlink_to(cache)
 
     def snakemake(self, *arguments: str) -> subprocess.CompletedProcess:
         environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
