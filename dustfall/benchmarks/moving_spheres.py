@@ -5,9 +5,11 @@ cube of one volume fraction without images, so that all can be asked the same qu
 """
 
 from collections.abc import Callable, Iterable
+from functools import partial
 
 import numpy as np
 import pandas as pd
+from scipy.spatial.distance import cdist
 
 from dustfall.forces import load_model
 from dustfall.sedimentation.closures.nearest_neighbours import drag_coefficients
@@ -53,12 +55,20 @@ def freely_turning_forces(centres, velocity, tolerance: float) -> tuple[np.ndarr
 
 
 def nearest_neighbours_drag(model, centres, velocity) -> np.ndarray:
-    """Drag (n, 3) that a force model of five neighbours tells each sphere, each by itself."""
-    apart = centres[None] - centres[:, None]
-    order = np.argsort(np.linalg.norm(apart, axis=2), axis=1)[:, 1 : NEIGHBOURS + 1]
-    neighbours = np.take_along_axis(apart, order[:, :, None], axis=1)
-    beta, lateral = drag_coefficients(model, velocity, neighbours)
+    """Drag (n, 3) that a force model of five neighbours tells each sphere: all move as it does."""
+    clusters = centres[_with_nearest(centres)]
+    beta, lateral = drag_coefficients(model, velocity, clusters[:, 1:] - clusters[:, :1])
     return lateral - beta[:, None] * velocity
+
+
+def among_nearest(drag, centres, velocity) -> np.ndarray:
+    """Drag (n, 3) on each sphere among its five neighbours alone, each at its own velocity."""
+    return np.array([drag(centres[own], velocity[own])[0] for own in _with_nearest(centres)])
+
+
+def _with_nearest(centres) -> np.ndarray:
+    """Rows (n, 6): each sphere and its five nearest, nearest first."""
+    return np.argsort(cdist(centres, centres), axis=1)[:, : NEIGHBOURS + 1]
 
 
 def rotne_prager_drag(centres, velocity) -> np.ndarray:
@@ -87,8 +97,16 @@ def moving_spheres(
     estimate (largest error estimate of the truth, in the drag of a lone sphere) and converged.
     """
     model = load_model()
+
+    def exact(x, v):
+        return freely_turning_forces(x, v, tolerance)[0]
+
     methods: dict[str, Callable] = {
         f"five neighbours ({model.name})": lambda x, v: nearest_neighbours_drag(model, x, v),
+        "five moving neighbours, Rotne-Prager and near field": partial(
+            among_nearest, near_field_drag
+        ),
+        "five moving neighbours, exact": partial(among_nearest, exact),
         "all, Rotne-Prager": rotne_prager_drag,
         "all, Rotne-Prager and near field": near_field_drag,
     }
