@@ -5,18 +5,32 @@ import shutil
 import signal
 import subprocess
 import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.faults.conftest import KILLS, SMOKE, TARGET, begin, copy_of, count, difference, end
+from tests.faults.conftest import (
+    KILLS,
+    SMOKE,
+    TARGET,
+    begin,
+    copy_of,
+    count,
+    difference,
+    end,
+    results,
+)
 from tests.workflow.conftest import Project
 
 pytestmark = pytest.mark.faults
 
 INTERRUPTIONS = max(2, KILLS // 10)
+
+SIDE_BY_SIDE = 2
+"""Campaigns that are stopped again and again at once."""
 
 DISK = 64
 """Size of the disk that runs full [MiB]: a smoke campaign leaves less than half of it."""
@@ -55,55 +69,63 @@ def finish(project: Project, whole: Project) -> str:
     return "silent" if difference(project, whole) else "healed"
 
 
-def test_a_campaign_killed_at_random_moments_ends_with_the_same_bits(
+def stop_at_random(
+    project: Project, whole: Project, signals: list[int], start_up: float, seed: int
+) -> list[tuple[int, str]]:
+    """Begin a campaign again and again, each time until a signal; what each led to."""
+    rng = np.random.default_rng(seed)
+    outcomes: list[tuple[int, str]] = []
+    for number in rng.permutation(signals):
+        # A kill comes at any moment; an interrupt after the start: there is no campaign before it.
+        soonest = 0.5 if number == signal.SIGKILL else 1.5
+        words = None
+        while words is None:
+            process = begin(
+                project, "--", *TARGET, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+            )
+            try:
+                words, _ = process.communicate(timeout=start_up * rng.uniform(soonest, 3.0))
+            except subprocess.TimeoutExpired:
+                end(process, number)
+                words, _ = process.communicate()
+            if process.returncode == 0:  # at its end before the moment came: once more
+                assert not difference(project, whole)
+                shutil.rmtree(project.folder / "results")
+                words = None
+        if number == signal.SIGKILL:
+            assert process.returncode == -signal.SIGKILL
+            unlock(project)
+            outcomes.append((number, "killed"))
+        else:
+            last = words.rstrip().splitlines()[-1]
+            told = last.startswith("Stopped: ") and "To go on: snakemake" in last
+            told = told and "Traceback" not in words
+            outcomes.append((number, "detected" if told else f"crashed ({last})"))
+    outcome = finish(project, whole)
+    return [(number, outcome if word == "killed" else word) for number, word in outcomes] + [
+        (0, outcome)
+    ]
+
+
+def test_a_campaign_stopped_at_random_moments_says_why_and_ends_with_the_same_bits(
     whole, tmp_path, ledger, start_up
 ):
-    rng = np.random.default_rng(KILLS)
-    project = Project(tmp_path)
-    killed = runs = 0
-    while killed < KILLS:
-        process = begin(project, "--", *TARGET)
-        try:
-            process.wait(start_up * rng.uniform(0.5, 4.0))
-        except subprocess.TimeoutExpired:
-            end(process, signal.SIGKILL)
-            killed += 1
-        process.wait()
-        unlock(project)
-        if process.returncode == 0:  # at its end before the moment came: once more
-            assert not difference(project, whole)
-            runs += 1
-            shutil.rmtree(project.folder / "results")
-        else:
-            assert process.returncode == -signal.SIGKILL
-    outcome = finish(project, whole)
-    count(ledger, "kill -9 of the process group at a random moment", KILLS * [outcome])
+    half = [signal.SIGKILL] * (KILLS // SIDE_BY_SIDE)
+    half += [signal.SIGINT, signal.SIGTERM] * (INTERRUPTIONS // SIDE_BY_SIDE)
 
+    def campaign(seed):
+        return stop_at_random(Project(tmp_path / str(seed)), whole, half, start_up, seed)
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_campaign_says_why_it_stopped_and_goes_on(
-    whole, tmp_path, ledger, start_up, number
-):
-    rng = np.random.default_rng(number)
-    project, outcomes = Project(tmp_path), []
-    while len(outcomes) < INTERRUPTIONS:
-        # After the start: before it there is no campaign that could stop.
-        process = begin(
-            project, "--", *TARGET, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-        )
-        try:
-            words, _ = process.communicate(timeout=start_up * rng.uniform(1.5, 3.0))
-        except subprocess.TimeoutExpired:
-            end(process, number)
-            words, _ = process.communicate()
-        if process.returncode == 0:
-            shutil.rmtree(project.folder / "results")
-            continue
-        last = words.rstrip().splitlines()[-1]
-        told = last.startswith("Stopped: ") and "To go on: snakemake" in last
-        outcomes.append("detected" if told and "Traceback" not in words else f"crashed ({last})")
-    count(ledger, f"{number.name} to the process group", outcomes)
-    count(ledger, f"the same command after {number.name}", [finish(project, whole)])
+    # Most of such a run is the start of Snakemake, which takes one core.
+    with ThreadPoolExecutor(SIDE_BY_SIDE) as pool:
+        found = [pair for pairs in pool.map(campaign, range(SIDE_BY_SIDE)) for pair in pairs]
+    for number, fault in {
+        signal.SIGKILL: "kill -9 of the process group at a random moment",
+        signal.SIGINT: "SIGINT to the process group",
+        signal.SIGTERM: "SIGTERM to the process group",
+        0: "the same command after kills and interrupts",
+    }.items():
+        count(ledger, fault, [outcome for own, outcome in found if own == number])
 
 
 @contextmanager
@@ -177,10 +199,9 @@ def test_a_folder_that_cannot_be_written_is_told(whole, tmp_path, ledger):
     count(ledger, "a folder of results that cannot be written", [outcome])
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_a_campaign_half_deleted_is_made_whole(whole, tmp_path, ledger, seed):
+def test_a_campaign_half_deleted_is_made_whole(whole, tmp_path, ledger):
     project = copy_of(whole, tmp_path)
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(1)
     files = sorted(path for path in (tmp_path / "results").rglob("*") if path.is_file())
     for path in files:
         if rng.random() < 0.5:
@@ -201,13 +222,13 @@ def test_a_campaign_half_deleted_is_made_whole(whole, tmp_path, ledger, seed):
 
 
 def test_of_two_runs_at_once_one_is_refused_and_the_other_ends(whole, tmp_path, ledger, start_up):
-    project = Project(tmp_path)
-    first = begin(project, "--", *TARGET)
+    project, target = Project(tmp_path), "results/dataset/forces.h5"
+    first = begin(project, "--", target)
     while not (tmp_path / ".snakemake/locks").exists():
         time.sleep(0.1)
-    time.sleep(start_up)
-    done = project.snakemake(*SMOKE, "--", *TARGET)
+    done = project.snakemake(*SMOKE, "--", target)
     refused = done.returncode != 0 and "snakemake --unlock" in done.stdout + done.stderr
     assert first.wait() == 0
     count(ledger, "a second run at once", ["detected" if refused else "silent"])
-    assert not difference(project, whole)
+    undisturbed = results(whole)
+    assert all(undisturbed[name] == content for name, content in results(project).items())
