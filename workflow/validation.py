@@ -600,6 +600,16 @@ def _by_component(table: pd.DataFrame, keys: Sequence[str], values: Sequence[str
     return found
 
 
+def paper_training(history: pd.DataFrame) -> pd.DataFrame:
+    """The training in the paper's way: both components at some epochs, best errors until then."""
+    best = history.assign(best=history.groupby("component")["validation_error"].cummin())
+    table = best.pivot(index="epoch", columns="component", values=["best", "r2"])
+    table.columns = [f"{component}_{name}" for name, component in table.columns]
+    last = table.index.max()
+    epochs = sorted({epoch for epoch in (100, 300, 1000, 3000, 10_000) if epoch < last} | {last})
+    return table.ffill().loc[epochs].reset_index()
+
+
 def _in_order(table: pd.DataFrame, column: str, names: Sequence[str]) -> pd.DataFrame:
     rank = table[column].map(list(names).index)
     return table.iloc[np.argsort(rank, kind="stable")].reset_index(drop=True)
@@ -662,6 +672,7 @@ PAPER_TABLES: dict[str, tuple[Callable[..., pd.DataFrame], tuple[str, ...]]] = {
     "settling": (apparent, (STEADY_STATE, CONFIGURATION)),
     "neighbour_numbers": (neighbour_numbers, ("results/studies/neighbour_numbers.csv",)),
     "steps": (pd.DataFrame, ("results/studies/step_size.csv",)),
+    "training": (paper_training, ("results/studies/paper_training.csv",)),
 }
 """The same of the page that goes through the paper."""
 

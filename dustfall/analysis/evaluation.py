@@ -9,6 +9,7 @@ from dustfall.analysis.correlations import coefficient_of_determination
 from dustfall.analysis.distributions import decades
 from dustfall.columns import Column
 from dustfall.dataset import Dataset
+from dustfall.forces.learned import LearnedModel
 from dustfall.scenes import SCENE_COLUMNS
 from dustfall.units import COMPONENTS
 
@@ -64,6 +65,28 @@ def scores(predictions: Mapping[str, np.ndarray], test: Dataset) -> pd.DataFrame
                         }
                     )
     return pd.DataFrame(rows)
+
+
+def training_history(model: LearnedModel, test: Dataset) -> pd.DataFrame:
+    """Tabulate the validation errors of a model just trained, and what it reached.
+
+    Returns the columns component, training_scenes, epoch, validation_error [(Re_p c_D)^2] and r2,
+    that of the weights kept on all scenes of `test`, the same in all rows of a component.
+    """
+    whole = scores({model.name: model.predict(test.neighbours)}, test)
+    reached = whole.drop_duplicates("component").set_index("component")["r2"]
+    return pd.concat(
+        pd.DataFrame(
+            {
+                "component": component,
+                "training_scenes": model.header["training"]["samples"],
+                "epoch": history.epochs,
+                "validation_error": history.validation_error,
+                "r2": reached[component],
+            }
+        )
+        for component, history in model.history.items()
+    )
 
 
 def error_by_gap(

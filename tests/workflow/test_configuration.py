@@ -68,7 +68,10 @@ def test_rules_read_every_key_and_no_other():
         ("studies.together", ["step_size"]),
         ("idnn.layers", ["plan", "winner"]),
         ("idnn.training_of.anchored.epochs", ["model", "trial"]),
-        ("dataset.test_share", ["plan", "sweep", "model", "trial", "learning_curve", "evaluation"]),
+        (
+            "dataset.test_share",
+            ["plan", "sweep", "model", "trial", "learning_curve", "evaluation", "paper_training"],
+        ),
         (
             "sedimentation.checkpoint_interval",
             [

@@ -212,6 +212,21 @@ def test_reduced_tables_keep_the_worst_of_what_they_reduce():
     assert row[["apart", "moved", "turned", "alike"]].tolist() == [1e-5, 1e-8, 2e-7, 3e-7]
 
 
+def test_a_training_is_shown_at_powers_and_at_its_end_with_the_best_until_then():
+    rows = [
+        ("streamwise", 100, 3.0), ("streamwise", 200, 4.0), ("streamwise", 300, 1.0),
+        ("lateral", 100, 0.5), ("lateral", 200, 0.4),
+    ]  # fmt: skip
+    history = pd.DataFrame(rows, columns=["component", "epoch", "validation_error"])
+    history["r2"] = history["component"].map({"streamwise": 0.9, "lateral": 0.8})
+    table = validation.paper_training(history).set_index("epoch")
+    assert table.index.tolist() == [100, 300]
+    assert table["streamwise_best"].tolist() == [3.0, 1.0]
+    # A component that stopped earlier keeps its best.
+    assert table["lateral_best"].tolist() == [0.5, 0.4]
+    assert table.loc[300, ["streamwise_r2", "lateral_r2"]].tolist() == [0.9, 0.8]
+
+
 def test_crowds_keep_the_worst_of_each_family():
     pair, lattice = validation.crowds(CROWDS).to_dict("records")
     assert (pair["scenes"], pair["solves"], pair["converged"]) == (2, 3, 2)

@@ -71,6 +71,27 @@ rule moving_spheres:
         "../scripts/moving_spheres.py"
 
 
+rule paper_training:
+    """Train the IDNN as the paper does: full batches, literal distances, hours on one core."""
+    input:
+        data="results/dataset/forces.h5",
+    output:
+        "results/studies/paper_training.csv",
+    log:
+        "logs/studies/paper_training.log",
+    benchmark:
+        "benchmarks/studies/paper_training.tsv"
+    resources:
+        gpu=GPUS,
+    params:
+        library=library("paper_training.py"),
+        seed=config["seed"],
+        test_share=config["dataset"]["test_share"],
+        device=config["idnn"]["device"],
+    script:
+        "../scripts/paper_training.py"
+
+
 rule study_of_neighbours:
     """Let a small cloud settle with another number of neighbours, by the Rotne-Prager inverse."""
     input:

@@ -10,6 +10,7 @@ FURTHER = [
     "results/figures/accuracy_vs_cost.csv",
     "results/studies/moving_spheres.csv",
     "results/studies/neighbour_numbers.csv",
+    "results/studies/paper_training.csv",
     "results/studies/step_size.csv",
 ]
 
