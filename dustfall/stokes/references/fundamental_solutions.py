@@ -155,13 +155,25 @@ def reference_loads(
     def error(coarser, finer):
         changes, loads = _parts(spheres, finer, coarser), _parts(spheres, finer)
         relative = CAUTION * changes.max(axis=0) / np.maximum(loads.max(axis=0), size)
-        return np.maximum(relative, amplified * (finer.slip() / size) ** 2) + finer.residual
+        return np.maximum(relative, _error_by_slip(spheres, finer.slip() / size)) + finer.residual
 
-    gap = min(_gaps(centres, radii).min() / (2.0 * radii.min()), 1.0)
-    amplified = SLIP_SQUARED * radii.max() / radii.min() / gap
     found, estimate = _climbed(spheres, tolerance, error)
     force, torque, stresslet = found.loads()
-    return Loads(force, torque, stresslet, estimate, found.slip() / size)
+    return Loads(force, torque, stresslet, estimate, float(found.slip().max() / size))
+
+
+def _error_by_slip(spheres, slip) -> np.ndarray:
+    """Error (n,) of each sphere's loads that a slip (n,) on the spheres tells of.
+
+    A pair's slip is that of its worse sphere; others feel a sphere's error as its Stokeslet.
+    """
+    radii = spheres.radii
+    smaller = np.minimum(radii[:, None], radii)
+    ratio = np.maximum(radii[:, None], radii) / smaller
+    gap = np.minimum(_gaps(spheres.centres, radii) / (2.0 * smaller), 1.0)
+    worse = np.maximum(slip[:, None], slip)
+    own = np.max(SLIP_SQUARED * ratio / gap * worse**2, axis=1)
+    return own + 1.5 * (radii / centre_distances(spheres.centres)) @ own
 
 
 def _parts(spheres, solution, less=None):
@@ -210,20 +222,24 @@ def _gaps(centres, radii):
 
 
 def _climbed(spheres: Spheres, tolerance, error):
-    """Solution and error on the first rung where the error against the rung before is allowed."""
-    rungs = _rungs(spheres, tolerance)
+    """Solution and its error against the rung before, within the tolerance where a rung is left.
+
+    Spheres whose own error is too large go one rung up, until all interactions are too many.
+    """
     goal = max(1e-3 * tolerance, 1e-13)
-    finer = solve_with(rungs[0], spheres, goal)
-    for numbers in rungs[1:]:
-        coarser, finer = finer, solve_with(numbers, spheres, goal)
+    rung = _first_rungs(spheres, tolerance)
+    finer = _solved_on(rung - 1, spheres, goal)
+    while True:
+        coarser, finer = finer, _solved_on(rung, spheres, goal)
         estimate = error(coarser, finer)
-        if np.max(estimate) <= tolerance:
-            break
-    return finer, estimate
+        higher = np.minimum(rung + (estimate > tolerance), len(LADDER) - 1)
+        if (higher == rung).all() or _interactions(higher) > MOST_INTERACTIONS:
+            return finer, estimate
+        rung = higher
 
 
-def _rungs(spheres, tolerance) -> list[np.ndarray]:
-    """Numbers of point forces (n,) to be tried, at least two, from one rung below what is needed.
+def _first_rungs(spheres, tolerance) -> np.ndarray:
+    """Rungs (n,) of LADDER, the first or higher ones, that should be needed, or as high as can be.
 
     A sphere's images in another converge at exp(-xi) of its radius, xi their bispherical
     coordinate, and so its forces as exp(-2 xi sqrt(number)), and at best as the lattice does, about
@@ -237,13 +253,21 @@ def _rungs(spheres, tolerance) -> list[np.ndarray]:
         xi = np.arcsinh(b * np.sinh(both) / distance)
     rate = np.minimum(2.0 * np.fmin.reduce(xi, axis=1, initial=np.inf), 1.0)
     needed = np.searchsorted(LADDER, (np.log(1.0 / tolerance) / rate) ** 2)
+    while True:
+        rung = np.clip(needed, 1, len(LADDER) - 1)
+        if _interactions(rung) <= MOST_INTERACTIONS or rung.max() == 1:
+            return rung
+        needed -= 1
 
-    steps = np.arange(-needed.max(), len(LADDER) - needed.min())
-    rungs = np.array(LADDER)[np.clip(needed + steps[:, None], 0, len(LADDER) - 1)]
-    interactions = POINTS_PER_FORCE * (rungs.sum(axis=1) ** 2 - (rungs**2).sum(axis=1))
-    last = max(int(np.count_nonzero(interactions <= MOST_INTERACTIONS)), 2)
-    first = min(max(int(needed.max()) - 1, 0), last - 2)
-    return list(rungs[first:last])
+
+def _interactions(rung) -> float:
+    """Pairs of a force and a surface point of two spheres on these rungs (n,)."""
+    numbers = np.array(LADDER)[rung]
+    return POINTS_PER_FORCE * float(numbers.sum() ** 2 - (numbers**2).sum())
+
+
+def _solved_on(rung, spheres, goal):
+    return solve_with(np.array(LADDER)[rung], spheres, goal)
 
 
 @dataclass(frozen=True)
@@ -282,16 +306,16 @@ class Solution:
         return self.spheres.flow + points @ self.spheres.gradient.T - stirred
 
     def slip(self):
-        """Largest velocity of the fluid against the spheres, between the points of the fit."""
-        spheres, found = self.spheres, 0.0
+        """Largest velocity (n,) of the fluid against each sphere, between the points of the fit."""
+        spheres, found = self.spheres, np.empty(len(self.places))
         for i, (places, radius) in enumerate(zip(self.places, spheres.radii, strict=True)):
             surface = radius * _lattice(POINTS_PER_FORCE * len(places), FRESH_ARMS, 0.6).reshape(
                 -1, 3
             )
             own = spheres.velocity[i] + np.cross(spheres.angular_velocity[i], surface)
             slip = self.velocity(spheres.centres[i] + surface) - own
-            found = max(found, np.linalg.norm(slip, axis=1).max())
-        return float(found)
+            found[i] = np.linalg.norm(slip, axis=1).max()
+        return found
 
 
 def solve_with(numbers, spheres: Spheres, goal: float = 1e-13) -> Solution:
