@@ -42,6 +42,10 @@ MOST_BYTES = 2 * 2**30
 """Memory that a reader may ask for, beyond what Python and its libraries have."""
 
 
+# A job that a shell put into the background ignores it, and so do all that it starts.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 @pytest.fixture(scope="session")
 def ledger() -> Iterator[dict[str, Counter]]:
     """Counts of outcomes by what was tried; the table takes them up at the end."""
