@@ -49,6 +49,11 @@ def unlock(project: Project) -> None:
     shutil.rmtree(project.folder / ".snakemake/locks", ignore_errors=True)
 
 
+def locked(project: Project) -> bool:
+    """Whether a run of Snakemake has begun that has not ended."""
+    return any((project.folder / ".snakemake/locks").glob("*"))
+
+
 def leftovers(project: Project) -> list[Path]:
     """Temporary files, copies of scripts and empty folders."""
     found = [*(project.folder / "results").rglob(".*")]
@@ -76,15 +81,20 @@ def stop_at_random(
     rng = np.random.default_rng(seed)
     outcomes: list[tuple[int, str]] = []
     for number in rng.permutation(signals):
-        # A kill comes at any moment; an interrupt after the start: there is no campaign before it.
-        soonest = 0.5 if number == signal.SIGKILL else 1.5
         words = None
         while words is None:
             process = begin(
                 project, "--", *TARGET, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
             )
+            # A kill comes at any moment; an interrupt once there is a campaign that could stop.
+            if number == signal.SIGKILL:
+                moment = rng.uniform(0.5, 3.0)
+            else:
+                moment = rng.uniform(0.0, 1.5)
+                while process.poll() is None and not locked(project):
+                    time.sleep(0.1)
             try:
-                words, _ = process.communicate(timeout=start_up * rng.uniform(soonest, 3.0))
+                words, _ = process.communicate(timeout=start_up * moment)
             except subprocess.TimeoutExpired:
                 end(process, number)
                 words, _ = process.communicate()
@@ -157,7 +167,7 @@ STAGES = [
     "results/scenes/uniform-0000.h5",
     "results/stokes/uniform-0000.h5",
     "results/dataset/forces.h5",
-    "results/sweep/streamwise/10-10.json",
+    "results/sweep/streamwise/10_10.json",
     "results/model/anchored.safetensors",
     "results/sedimentation/n100_phi1e-03_ga1_rotne_prager_long.nc",
     "results/analysis/steady_state.csv",
@@ -224,7 +234,7 @@ def test_a_campaign_half_deleted_is_made_whole(whole, tmp_path, ledger):
 def test_of_two_runs_at_once_one_is_refused_and_the_other_ends(whole, tmp_path, ledger, start_up):
     project, target = Project(tmp_path), "results/dataset/forces.h5"
     first = begin(project, "--", target)
-    while not (tmp_path / ".snakemake/locks").exists():
+    while not locked(project):
         time.sleep(0.1)
     done = project.snakemake(*SMOKE, "--", target)
     refused = done.returncode != 0 and "snakemake --unlock" in done.stdout + done.stderr
