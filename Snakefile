@@ -152,6 +152,7 @@ rule verify:
 
 
 onstart:
+    stops.require_writable()
     stops.clear()
     print(f"The whole campaign takes about {bound}; what is there already is not made again.")
     if workflow.local_exec:

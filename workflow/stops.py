@@ -57,11 +57,26 @@ def clear() -> None:
             os.rmdir(folder)
 
 
+def require_writable() -> None:
+    """Exit with a sentence where nothing can be written to `results`.
+
+    Snakemake removes old outputs before a job begins, and shows no more than a traceback where it
+    cannot.
+    """
+    if RESULTS.exists() and not os.access(RESULTS, os.W_OK):
+        read_only = os.statvfs(RESULTS).f_flag & os.ST_RDONLY
+        cause = CAUSES[errno.EROFS if read_only else errno.EACCES]
+        sys.exit(_last_words(f"{RESULTS}: {cause}"))
+
+
 def announce(logs) -> None:
     """Say at the very end why the run stopped, and what goes on; `logs` are those of Snakemake."""
-    command = shlex.join(["snakemake", *sys.argv[1:]])
     words = "; ".join(dict.fromkeys(_notes())) or _killed(logs) or "the cause is shown above"
-    atexit.register(print, f"Stopped: {words}. To go on: {command}", file=sys.stderr, flush=True)
+    atexit.register(print, _last_words(words), file=sys.stderr, flush=True)
+
+
+def _last_words(words: str) -> str:
+    return f"Stopped: {words}. To go on: {shlex.join(['snakemake', *sys.argv[1:]])}"
 
 
 def _notes() -> list[str]:
