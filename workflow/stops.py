@@ -33,6 +33,9 @@ def sentence(error: BaseException) -> str:
     if isinstance(error, OSError) and error.errno in CAUSES:
         file = f"{error.filename}: " if error.filename else ""
         return f"{file}{CAUSES[error.errno]}"
+    told = re.search(r"\(os error (\d+)\)", words)  # by libraries in Rust, safetensors among them
+    if told and int(told[1]) in CAUSES:
+        return CAUSES[int(told[1])]
     if isinstance(error, MemoryError):
         return f"{CAUSES[errno.ENOMEM]}: {words}" if words else CAUSES[errno.ENOMEM]
     return words or type(error).__name__

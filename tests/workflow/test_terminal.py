@@ -1,5 +1,6 @@
 """What a terminal shows of a run: a line with the time to go, and last the reason of a failure."""
 
+import errno
 import os
 import pty
 import re
@@ -9,6 +10,7 @@ import sys
 import pytest
 
 from tests.workflow.conftest import Project
+from workflow.stops import sentence
 from workflow.terminal import Job, Run, duration, last_line, progress_of
 
 
@@ -107,3 +109,22 @@ def test_times_are_rounded_to_what_is_known():
     assert [duration(s) for s in (0, 44, 89, 3599, 4800)] == [
         "10 s", "40 s", "1 min", "1 h 0 min", "1 h 20 min",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (OSError(errno.ENOSPC, "", "results/a.h5"), "results/a.h5: the disk is full"),
+        # As safetensors has it.
+        (RuntimeError("I/O error: No space left on device (os error 28)"), "the disk is full"),
+        (
+            RuntimeError("I/O error: Is a directory (os error 21)"),
+            "I/O error: Is a directory (os error 21)",
+        ),
+        (MemoryError(), "the memory is used up"),
+        (ValueError("one\nand two"), "one and two"),
+        (KeyboardInterrupt(), "KeyboardInterrupt"),
+    ],
+)
+def test_an_error_is_told_by_its_cause(error, words):
+    assert sentence(error) == words
