@@ -107,6 +107,7 @@ rule benchmarks:
     input:
         "results/benchmarks/solver.csv",
         "results/benchmarks/moving.csv",
+        "results/benchmarks/moving_cost.csv",
         "results/benchmarks/moving_estimates.csv",
         "results/benchmarks/settling.csv",
         "results/benchmarks/stress.csv",

@@ -33,6 +33,7 @@ class Written(string.Formatter):
 
     power: 1e-4, with the digits that tell the number and no more. error: two digits, 3.1e-5, 0.19.
     near_one: 1 - 3.2e-6 for what is nearly one, else four decimals. count: 33,000. percent: 42.9 %.
+    short: two digits and no power, 120,000, 9.5.
     """
 
     def format_field(self, value: Any, format_spec: str) -> str:
@@ -49,6 +50,9 @@ class Written(string.Formatter):
                 return f"1 - {self.format_field(rest, 'error')}" if near else f"{value:.4f}"
             case "count":
                 return f"{value:,.0f}"
+            case "short":
+                rounded = float(f"{value:.2g}")
+                return f"{rounded:,.0f}" if abs(rounded) >= 10 else f"{rounded:g}"
             case "percent":
                 return f"{100 * value:.1f} %"
         return super().format_field(value, format_spec)

@@ -26,6 +26,7 @@ from dustfall.analysis.references import (
     PAPER_SCORES,
     PAPER_SETTLING,
 )
+from dustfall.benchmarks.moving_estimates import coverage
 from dustfall.benchmarks.solver import MULTIPOLE
 from dustfall.figures.style import CLOSURES, model_title
 from dustfall.scenes import LAWS
@@ -66,6 +67,7 @@ PICTURES = {
         )
     },
     "settling_cloud.gif": "results/figures/settling_cloud.gif",
+    "moving.png": "results/benchmarks/moving.png",
     "solver.png": "results/benchmarks/solver.png",
 }
 """Pictures that README and docs show: name in docs/pictures, and the file that it is a copy of."""
@@ -179,7 +181,7 @@ def random_scenes(solver: pd.DataFrame) -> pd.DataFrame:
 
 
 def methods(solver: pd.DataFrame) -> pd.DataFrame:
-    """Every method in the densest decade and near contact: one row a method and setting."""
+    """Every method in the two last sets, near contact the last: one row a method and setting."""
     sets = list(dict.fromkeys(solver["set"]))[-COMPARED_SETS:]
     compared = solver[solver["set"].isin(sets)]
     keys = ["method", "setting"]
@@ -631,6 +633,9 @@ TABLES: dict[str, tuple[Callable[..., pd.DataFrame], tuple[str, ...]]] = {
     "spheres": (pd.DataFrame, ("results/benchmarks/spheres.csv",)),
     "strain": (strain, (STRESS,)),
     "crowds": (crowds, (STRESS,)),
+    "moving": (methods, ("results/benchmarks/moving.csv",)),
+    "moving_estimates": (coverage, ("results/benchmarks/moving_estimates.csv",)),
+    "moving_cost": (pd.DataFrame, ("results/benchmarks/moving_cost.csv",)),
     "scenes": (scenes, ("results/dataset/summary.csv",)),
     "forces": (forces, ("results/dataset/summary.json",)),
     "scores": (scores, ("results/model/evaluation.csv", "results/model/symmetries.csv")),

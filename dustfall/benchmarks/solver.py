@@ -15,6 +15,7 @@ from dustfall.stokes.elements.boundary_elements import forces_by_elements
 from dustfall.stokes.elements.mesh import sphere_mesh
 from dustfall.stokes.elements.outer_sphere import forces_in_outer_sphere
 from dustfall.stokes.methods import fixed_spheres
+from dustfall.stokes.plan import plan_scene
 from dustfall.stokes.references.fundamental_solutions import reference_forces
 from dustfall.stokes.references.multiblob import multiblob_forces
 from dustfall.streams import Purpose, stream
@@ -145,26 +146,45 @@ def time_against_error(
 
 
 def time_against_spheres(
-    numbers: Sequence[int], tolerance: float = 1e-4, seed: int = 1, repeats: int = 5
+    numbers: Sequence[int],
+    fractions: Sequence[float] = (0.01, 1e-6),
+    tolerance: float = 1e-4,
+    seed: int = 1,
+    repeats: int = 5,
 ) -> pd.DataFrame:
-    """Solve n random spheres at a volume fraction of 1 %, for each n: milliseconds and exponent.
+    """Solve n random spheres at each volume fraction, for each n: milliseconds and exponent.
 
-    Columns spheres, milliseconds (median of `repeats`), iterations, error_estimate (largest) and
-    exponent, the slope of log time against log n over all n from 8.
+    Columns volume_fraction, spheres, milliseconds (median of `repeats`, or one run where it takes a
+    second and more), plan_milliseconds (of `plan_scene`, which is part of it), iterations,
+    error_estimate (largest), status and exponent, the slope of log time against log n over all n
+    from 8 of a volume fraction.
     """
     rows = []
-    for n in numbers:
-        centres = random_cloud(n, 0.01, stream(Purpose.BENCHMARK, seed, n))
-        seconds = []
-        for _ in range(repeats + 1):
-            start = time.perf_counter()
-            found = fixed_spheres(centres, tolerance=tolerance)
-            seconds.append(time.perf_counter() - start)
-        rows.append((n, 1e3 * np.median(seconds[1:]), found.iterations, found.error_estimate.max()))
-    table = pd.DataFrame(rows, columns=["spheres", "milliseconds", "iterations", "error_estimate"])
-    many = table[table["spheres"] >= 8]
-    slope = np.polyfit(np.log(many["spheres"]), np.log(many["milliseconds"]), 1)[0]
-    return table.assign(exponent=slope)
+    for phi in fractions:
+        for n in numbers:
+            centres = random_cloud(n, phi, stream(Purpose.BENCHMARK, seed, n))
+            fixed_spheres(centres[:2], tolerance=tolerance)
+            seconds: list[float] = []
+            planned: list[float] = []
+            while len(seconds) < repeats and sum(seconds[:1]) < 1.0:
+                start = time.perf_counter()
+                found = fixed_spheres(centres, tolerance=tolerance)
+                seconds.append(time.perf_counter() - start)
+                start = time.perf_counter()
+                plan_scene(centres, tolerance)
+                planned.append(time.perf_counter() - start)
+            rows.append(
+                (phi, n, 1e3 * np.median(seconds), 1e3 * np.median(planned), found.iterations,
+                 found.error_estimate.max(), str(found.status))
+            )  # fmt: skip
+    columns = "volume_fraction spheres milliseconds plan_milliseconds iterations error_estimate"
+    table = pd.DataFrame(rows, columns=[*columns.split(), "status"])
+    many = table[table["spheres"] >= 8].groupby("volume_fraction")
+    slopes = {
+        phi: np.polyfit(np.log(own["spheres"]), np.log(own["milliseconds"]), 1)[0]
+        for phi, own in many
+    }
+    return table.assign(exponent=table["volume_fraction"].map(slopes))
 
 
 def rotne_prager(centres, flow=(0.0, 1.0, 0.0)) -> np.ndarray:

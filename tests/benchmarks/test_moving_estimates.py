@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 
-from dustfall.benchmarks.moving_estimates import coverage, judged
+from dustfall.benchmarks.moving_estimates import cost, coverage, judged
 
 
 def test_coverage_counts_loads_that_the_reference_knows_and_no_others():
@@ -25,3 +25,12 @@ def test_the_loads_of_a_small_cluster_are_known_and_covered():
     found = coverage(judged(1, tolerances=(1e-2,), seed=11))
     assert (found["loads"] == found["known"]).all()
     assert (found[["converged", "within", "covered"]] == 1.0).all(axis=None)
+
+
+def test_what_a_cloud_costs_is_told_for_each_number_and_volume_fraction():
+    table = cost([5, 9], (0.01, 0.05), tolerance=1e-2)
+    assert table["spheres"].tolist() == [5, 9, 5, 9]
+    assert set(table["status"]) == {"converged"}
+    assert (table["error_estimate"] <= 1e-2).all()
+    assert (table["seconds"] > 0.0).all()
+    assert (table["memory"] > 0.0).all()

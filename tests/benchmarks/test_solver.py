@@ -56,8 +56,12 @@ def test_a_tighter_tolerance_has_the_smaller_error_and_an_estimate_that_covers_i
 
 
 def test_cost_against_spheres_reports_the_slope_that_its_times_have():
-    table = time_against_spheres([4, 8, 12, 16], 1e-2, repeats=1)
-    many = table[table["spheres"] >= 8]
-    slope = np.polyfit(np.log(many["spheres"]), np.log(many["milliseconds"]), 1)[0]
-    assert table["exponent"].to_numpy() == pytest.approx(slope)
+    table = time_against_spheres([4, 8, 12, 16], [1e-2, 1e-5], 1e-2, repeats=1)
+    assert len(table) == 8
+    for _, own in table.groupby("volume_fraction"):
+        many = own[own["spheres"] >= 8]
+        slope = np.polyfit(np.log(many["spheres"]), np.log(many["milliseconds"]), 1)[0]
+        assert own["exponent"].to_numpy() == pytest.approx(slope)
+    assert (table["plan_milliseconds"] > 0.0).all()
     assert (table["error_estimate"] < 1e-2).all()
+    assert set(table["status"]) == {"converged"}

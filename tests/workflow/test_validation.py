@@ -271,6 +271,13 @@ def test_another_score_has_four_decimals(value):
     assert Written().format_field(value, "near_one") == f"{value:.4f}"
 
 
+@pytest.mark.parametrize(
+    ("value", "short"), [(123_876.0, "120,000"), (433.0, "430"), (9.46, "9.5"), (0.0831, "0.083")]
+)
+def test_a_time_is_written_short(value, short):
+    assert Written().format("{:short}", value) == short
+
+
 def test_a_cell_falls_back_where_a_value_is_missing():
     table = pd.DataFrame({"value": [1.0, None], "half": [0.1, None], "end": [2.0, 3.0]})
     columns = {"a": ["{value:.0f} ± {half:.1f}", "at the end {end:.0f}"], "b": "{value:.1f}"}

@@ -69,6 +69,20 @@ rule moving_estimates:
         "../scripts/moving_estimates.py"
 
 
+rule moving_cost:
+    """Time and memory of the velocities of clouds that settle, by their number of spheres."""
+    output:
+        "results/benchmarks/moving_cost.csv",
+    log:
+        "logs/benchmarks/moving_cost.log",
+    params:
+        library=library("moving_cost.py"),
+        seed=config["seed"],
+        spheres=config["benchmarks"]["spheres"],
+    script:
+        "../scripts/moving_cost.py"
+
+
 rule settling_benchmark:
     """Seconds a step and memory of clouds, by their number of particles."""
     output:

@@ -3,6 +3,9 @@
 
 # Parts that a campaign may have or not: what is missing here has no section in the page.
 FURTHER = [
+    "results/benchmarks/moving.csv",
+    "results/benchmarks/moving_cost.csv",
+    "results/benchmarks/moving_estimates.csv",
     "results/benchmarks/settling.csv",
     "results/benchmarks/solver.csv",
     "results/benchmarks/spheres.csv",
