@@ -28,12 +28,10 @@ class Project:
 
     def _share_kernels(self) -> None:
         """Compile what numba compiles once, here or there: what a test edits is compiled anew."""
-        for source in ROOT.glob("dustfall/**/*.py"):
-            cache = source.parent / "__pycache__"
+        for package in {source.parent for source in ROOT.glob("dustfall/**/*.py")}:
+            cache = package / "__pycache__"
             cache.mkdir(exist_ok=True)
-            own = self.folder / cache.relative_to(ROOT)
-            if not own.exists():
-                own.symlink_to(cache)
+            (self.folder / cache.relative_to(ROOT)).symlink_to(cache)
 
     def snakemake(self, *arguments: str) -> subprocess.CompletedProcess:
         environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
