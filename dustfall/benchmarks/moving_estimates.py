@@ -36,8 +36,8 @@ NUMBERS = (2, 3, 4, 6, 10, 20)
 """Of spheres of a sampled cluster."""
 
 KNOWN_NUMBERS = (2, 3, 4, 6, 10)
-"""Of clusters whose loads fundamental solutions know to 1e-3 in a minute or two, if at all: those
-of 20 spheres they do not."""
+"""Of clusters whose loads fundamental solutions know to 1e-3 in a minute or two, if at all; those
+of 20 spheres were not tried."""
 
 COLUMNS = ["spheres", "gap", "tolerance", "error", "estimate", "status"]
 

@@ -81,7 +81,7 @@ PAPER_SETTINGS = TrainingSettings(
     schedule="constant",
 )
 """Full batch, patience and validation as in the paper; rate and decay, not given there, are
-PyTorch's defaults for AdamW, and the epochs what an hour and a half on one core takes."""
+PyTorch's defaults for AdamW, and the epochs what an hour or so on one core takes."""
 
 
 @dataclass(frozen=True)

@@ -72,7 +72,7 @@ rule moving_spheres:
 
 
 rule paper_training:
-    """Train the IDNN as the paper does: full batches, literal distances, hours on one core."""
+    """Train the IDNN as the paper does: full batches, literal distances, an hour or so on one core."""
     input:
         data="results/dataset/forces.h5",
     output:
