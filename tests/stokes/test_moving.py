@@ -163,7 +163,7 @@ def test_crowds_feel_what_fundamental_solutions_find(n, mixed, seed):
 
 
 def test_estimates_cover_the_errors_of_random_clusters():
-    samples = sampled(3, tolerances=(1e-2, 1e-4), seed=3)
+    samples = sampled(4, tolerances=(1e-2, 1e-4), seed=3)
     converged = samples[samples["status"] == "converged"]
     assert len(converged) > 0.95 * len(samples)
     assert (converged["error"] <= converged["tolerance"]).all()
