@@ -21,8 +21,8 @@ from dustfall.columns import DEFLATE, own_column
 from dustfall.dataset import OWN_LAW, Dataset, check
 from dustfall.extras import extra
 from dustfall.forces.frames import check_neighbours, sort_by_distance
+from dustfall.scenes import volume_fraction
 from dustfall.spheres import checked_numbers
-from dustfall.units import SPHERE_VOLUME
 
 with extra("files"):
     import h5py
@@ -72,9 +72,7 @@ def _dataset(columns: Mapping[str, np.ndarray]) -> tuple[Dataset, np.ndarray | N
     dataset = Dataset(
         neighbours=neighbours,
         force=columns["force"],
-        volume_fraction=columns.get(
-            "volume_fraction", 3 * k * SPHERE_VOLUME / (4 * np.pi * farthest**3)
-        ),
+        volume_fraction=columns.get("volume_fraction", volume_fraction(farthest, k)),
         radial_law=np.full(number, OWN_LAW),
         scene=np.arange(number),
         weight=columns.get("weight"),

@@ -18,7 +18,7 @@ from dustfall.forces.features import FEWEST
 from dustfall.forces.frames import MOST_NEIGHBOURS
 from dustfall.forces.registry import settling_models, trained_models
 from dustfall.own_data import shape
-from dustfall.scenes import LAWS
+from dustfall.scenes import LAWS, densest
 from dustfall.sedimentation.properties import MOST_GALILEO, Properties
 from dustfall.sedimentation.state import box_length
 from dustfall.suspension.near_field import REACH
@@ -305,13 +305,13 @@ def _check_physics(config: dict) -> None:
         f"studies.neighbours goes up to {most}, but must stay below the smallest of "
         f"sedimentation.particles, which is {fewest}.",
     )
-    densest = max(settle["volume_fractions"])
+    phi = max(settle["volume_fractions"])
     for particles in settle["all_particles"]["particles"]:
-        length, needed = box_length(particles, densest), 2 * REACH
+        length, needed = box_length(particles, phi), 2 * REACH
         _require(
             length > needed,
             f"sedimentation.all_particles.particles is {particles}, but must be so many that the "
-            f"cube is longer than {needed:g} diameters at phi = {densest:g}; it is {length:.3g}.",
+            f"cube is longer than {needed:g} diameters at phi = {phi:g}; it is {length:.3g}.",
         )
     for step in studies["steps"]:
         _require_multiple("studies.duration", studies["duration"], "one of studies.steps", step)
@@ -427,8 +427,20 @@ def _check_start_file(config: dict) -> None:
 
 
 def _check_scenes(config: dict) -> None:
-    """Refuse numbers of scenes that leave a stage without any."""
+    """Refuse scenes without room, and numbers of scenes that leave a stage without any."""
     scenes = config["scenes"]
+    neighbours = scenes["neighbours"]
+    _require(
+        scenes["phi_max"] <= densest(neighbours),
+        f"scenes.phi_max is {scenes['phi_max']:g}, but must be at most {densest(neighbours):.3g} "
+        f"with {neighbours} of scenes.neighbours: random draws without overlap stall above.",
+    )
+    smallest = min(config["sedimentation"]["particles"])
+    _require(
+        neighbours < smallest,
+        f"scenes.neighbours is {neighbours}, but must be below the smallest of "
+        f"sedimentation.particles, which is {smallest}.",
+    )
     laws = config["idnn"]["laws"]
     drawn = sum(scenes["number"][law] for law in laws)
     fewest = 10 * config["idnn"]["folds"]

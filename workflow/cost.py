@@ -22,7 +22,7 @@ OTHER_JOBS = 40
 """Tables and figures, of which every campaign has one each."""
 
 SOLVE_SECONDS = {"multipole": 2e-3, "elements": 1.0, "paper": 10.0}
-"""One scene by each method; boundary elements need from 0.1 to some seconds."""
+"""One scene of six spheres by each method; it grows with their square. Boundary elements need from 0.1 to some seconds."""
 
 NETWORK_SECONDS = 5e-10
 """One multiplication by a weight, for one scene in one epoch, with its share of all else."""
@@ -31,7 +31,7 @@ STEP_SECONDS = {"neighbours": 2.5e-6, "all particles": 1.0e-5}
 """One particle in one step."""
 
 SCENE_BYTES = 1500
-"""A scene with its record of forces, its place in the data set and its predictions."""
+"""A scene of five neighbours with its record of forces, its place in the data set and its predictions."""
 
 STEP_BYTES = 400
 """A step in the series of a run."""
@@ -97,8 +97,9 @@ def cost(config: dict) -> Cost:
     shards = sum(ceil(number / config["scenes"]["shard_size"]) for number in numbers.values())
     trainings = list(_trainings(config))
     cases = plan.cases(config)
-    seconds = drawn * SOLVE_SECONDS[stokes["method"]]
-    seconds += (audited + kept) * SOLVE_SECONDS["elements"]
+    pairs = ((plan.neighbours(config) + 1) / 6) ** 2
+    seconds = pairs * drawn * SOLVE_SECONDS[stokes["method"]]
+    seconds += pairs * (audited + kept) * SOLVE_SECONDS["elements"]
     seconds += sum(work * NETWORK_SECONDS for work, _ in trainings)
     # Coordinates, velocities and drag; what is unfinished lies in the checkpoint as well.
     frame = VECTOR_BYTES[settle["precision"]] + 16
@@ -156,10 +157,10 @@ def _memory() -> float:
 def _trainings(config: dict):
     """Multiplications of every training of a network, over its epochs, and weights in memory."""
     idnn = config["idnn"]
-    scenes = plan.training_scenes(config, "idnn")
+    scenes, neighbours = plan.training_scenes(config, "idnn"), plan.neighbours(config)
     for layers in idnn["layers"]:
         for component in ("streamwise", "lateral"):
-            each = multiplications("idnn", layers, component)
+            each = multiplications("idnn", layers, component, neighbours)
             folds = idnn["folds"]
             yield each * scenes * folds * idnn["training"]["epochs"], each * folds
     trials = [
@@ -174,7 +175,7 @@ def _trainings(config: dict):
         layers, number = rest.rsplit("-", 1)
         drawn = plan.training_scenes(config, model) if number == "all" else int(number)
         each = sum(
-            multiplications(model, plan.trial_layers(layers), component)
+            multiplications(model, plan.trial_layers(layers), component, neighbours)
             for component in ("streamwise", "lateral")
         )
         yield each * drawn * plan.training(config, model)["epochs"], each

@@ -44,6 +44,12 @@ class Case(NamedTuple):
         return "_".join(filter(None, [self.start, self.compared, "long" if self.long else ""]))
 
 
+def neighbours(config: dict) -> int:
+    """Number of neighbours that a scene has, and that a particle of a cloud feels."""
+    own = config["dataset"]["file"]
+    return shape(own)[1] if own else config["scenes"]["neighbours"]
+
+
 def shards(config: dict) -> list[str]:
     """Names of all shards, like uniform-0000: scenes are numbered and cut per radial law.
 

@@ -9,10 +9,11 @@ from scipy import stats
 from scipy.spatial import cKDTree
 
 from dustfall.analysis.settling import case_of, from_time, with_starts
+from dustfall.scenes import volume_fraction
 from dustfall.sedimentation.neighbours import nearest_neighbours
 from dustfall.sedimentation.properties import mean_spacing
 from dustfall.suspension.cube import folded
-from dustfall.units import CONTACT, NEIGHBOURS, SPHERE_VOLUME
+from dustfall.units import CONTACT, NEIGHBOURS
 
 SHELLS = 24
 """Shells of a pair distribution, in geometric progression of their radii."""
@@ -99,12 +100,12 @@ def pair_distribution_table(
 def local_volume_fraction(positions, length: float) -> np.ndarray:
     """Volume fraction (n,) around each particle by its fifth neighbour, as the paper takes it.
 
-    phi_i = 5 V_p / (4 pi d_5^3 / 3), d_5 the distance to the fifth neighbour (paper, section
-    "Mineral dust sedimentation"). Over random points its mean is `RANDOM_SHARE` times the bulk's.
+    `scenes.volume_fraction` of the distance to the fifth neighbour (paper, section "Mineral dust
+    sedimentation"). Over random points its mean is `RANDOM_SHARE` times the bulk's.
     """
     vectors, _ = nearest_neighbours(positions, length, NEIGHBOURS)
     farthest = np.linalg.norm(vectors[:, -1], axis=1)
-    return NEIGHBOURS * SPHERE_VOLUME / (4 / 3 * np.pi * farthest**3)
+    return volume_fraction(farthest)
 
 
 def local_volume_fraction_table(

@@ -9,7 +9,7 @@ from dustfall.forces.learned import block_widths
 from dustfall.scenes import random_scenes, volume_fraction
 from dustfall.units import COMPONENTS
 
-SEED, SCENES, FIFTH = 1, 200, 4.5
+SEED, SCENES, FARTHEST = 1, 200, 4.5
 """The scene is one of these, with its fifth neighbour so near [d_p] that spheres can be seen."""
 
 RELATIVE_VELOCITY = np.array([0.35, 0.9, 1.0])
@@ -47,7 +47,7 @@ def _row(panel, kind, name, tip, start=(np.nan, np.nan, np.nan)) -> dict:
 
 def _scene() -> np.ndarray:
     """Neighbours (5, 3) [d_p] of the scene whose spheres hide one another least on the page."""
-    phi = float(volume_fraction(FIFTH))
+    phi = float(volume_fraction(FARTHEST))
     scenes, _ = random_scenes(SEED, "uniform", range(SCENES), (phi, phi))
     apart = []
     for scene in scenes:

@@ -8,7 +8,7 @@ import yaml
 
 from dustfall.analysis import spectra
 from dustfall.forces.registry import trained_models
-from dustfall.scenes import LAWS
+from dustfall.scenes import LAWS, MOST_PLACED
 from workflow import configuration
 from workflow.configuration import ConfigurationError, configure, keys, load_schema, read_file
 from workflow.readers import read_by, readers
@@ -140,6 +140,8 @@ REFUSED = [
     ("scenes.phi_max", 0.7, "scenes.phi_max is 0.7, but must be a number at least 1e-12 and at"),
     ("scenes.phi_max", float("nan"), "scenes.phi_max is nan, but must be a number"),
     ("scenes.phi_min", 2e-3, "scenes.phi_min is 0.002, but must be below scenes.phi_max, which"),
+    ("scenes.neighbours", 2, "scenes.neighbours is 2, but must be a whole number at least 3 and"),
+    ("scenes", {"neighbours": 3, "phi_max": 0.05}, "phi_max is 0.05, but must be at most 0.0469"),
     ("scenes.number", {"uniform": 20}, "scenes.number is 20 in all of uniform, but must be at"),
     ("stokes.tolerance", 0, "stokes.tolerance is 0, but must be a number"),
     ("dataset.test_share", 1, "dataset.test_share is 1, but must be a number at least 0.01"),
@@ -195,6 +197,16 @@ REFUSED = [
     ("seed", 1e300, "seed is 1e+300, but must be a whole number at least 0 and at most"),
     ("figures.fit_frequencies", [1], "figures.fit_frequencies is [1.0], but must be two numbers"),
 ]
+
+
+def test_a_cloud_has_more_particles_than_neighbours():
+    settings = {"scenes": {"neighbours": 20}, "sedimentation": {"particles": [15, 1000]}}
+    with pytest.raises(ConfigurationError, match=r"neighbours is 20, but must be below .* is 15\."):
+        configure(settings)
+
+
+def test_scenes_have_as_many_neighbours_as_find_room():
+    assert keys(load_schema())["scenes.neighbours"]["maximum"] == MOST_PLACED
 
 
 def test_figures_need_scenes_of_their_law():

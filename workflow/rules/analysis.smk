@@ -63,7 +63,7 @@ rule independence_of_n:
 
 
 rule neighbour_changes:
-    """Count how often the five nearest neighbours change."""
+    """Count how often the nearest neighbours change."""
     input:
         series=expand("results/sedimentation/{case}.series.nc", case=NEIGHBOUR_CASES),
     output:

@@ -8,6 +8,7 @@ rule scenes:
         library=library("scenes.py"),
         seed=config["seed"],
         numbers=lambda wc: plan.shard_scenes(config, wc.law, wc.shard),
+        neighbours=config["scenes"]["neighbours"],
         phi_min=config["scenes"]["phi_min"],
         phi_max=config["scenes"]["phi_max"],
     script:

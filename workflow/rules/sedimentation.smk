@@ -21,6 +21,7 @@ rule sedimentation:
         seed=config["seed"],
         stream=lambda wc: plan.start_stream(CASES[wc.case].start),
         model=lambda wc: plan.force_model(config, wc.case),
+        neighbours=plan.neighbours(config),
         back_flow=lambda wc: CASES[wc.case].compared == plan.BACK_FLOW,
         particles=lambda wc: CASES[wc.case].particles,
         volume_fraction=lambda wc: CASES[wc.case].volume_fraction,

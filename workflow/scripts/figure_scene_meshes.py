@@ -19,6 +19,7 @@ joblog.start(snakemake)
 
 shards = [read_columns(path, SCENE_COLUMNS)["neighbours"] for path in snakemake.input.scenes]
 neighbours = np.concatenate(shards)
+number = neighbours.shape[1]
 distance = np.linalg.norm(neighbours, axis=2)
 tolerance = max(snakemake.params.tolerance, TOLERANCE)
 
@@ -30,7 +31,7 @@ def meshed(scene, spheres):
     return table[table["sphere"] < spheres]
 
 
-# The fifth neighbour is far away in every scene, so the fourth says how compact it is.
+# The farthest neighbour says phi alone; the one before it, how compact a scene is.
 compact = np.argmin(distance[:, -2])
 # A narrower gap is not meshed.
 meshable = distance[:, 0] >= CONTACT + NARROWEST_GAP
@@ -38,7 +39,7 @@ nearest = np.argmin(np.where(meshable, distance[:, 0], np.inf))
 pair = meshed(nearest, 2)
 gap = f"gap {distance[nearest, 0] - CONTACT:.2g} $d_p$"
 panels = [
-    meshed(compact, neighbours.shape[1]).assign(scene=0, title="five of six spheres"),
+    meshed(compact, number).assign(scene=0, title=f"{number} of {number + 1} spheres"),
     pair.assign(scene=1, title=gap),
     pair[pair["sphere"] == 0].assign(scene=2, title="seen from the neighbour"),
 ]

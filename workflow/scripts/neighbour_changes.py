@@ -1,4 +1,4 @@
-"""Count how often the five nearest neighbours change in the steady state."""
+"""Count how often the nearest neighbours change in the steady state."""
 
 import xarray as xr
 

@@ -11,7 +11,11 @@ params = snakemake.params
 
 numbers = np.arange(*params.numbers)
 neighbours, phi = random_scenes(
-    params.seed, snakemake.wildcards.law, numbers, (params.phi_min, params.phi_max)
+    params.seed,
+    snakemake.wildcards.law,
+    numbers,
+    (params.phi_min, params.phi_max),
+    params.neighbours,
 )
 values = {"neighbours": neighbours, "volume_fraction": phi, "scene": numbers}
 write_columns(snakemake.output[0], SCENE_COLUMNS, values)
