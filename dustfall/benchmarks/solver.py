@@ -31,7 +31,10 @@ EXACT = 1e-8
 PAPER_EDGES = (0.162, 0.29)
 """Edges [radii] of meshes with 637 nodes a particle and 190 on the outer sphere: the paper's."""
 
-MULTIPOLE = "multipoles"
+MULTIPOLE, ELEMENTS = "multipoles", "boundary elements"
+
+MESHED = 1e-4
+"""Tightest tolerance that boundary elements are timed at: the next takes ten times as long."""
 
 RUNGS = {
     "constant, flat elements": (0.7, 0.35),
@@ -59,10 +62,15 @@ class Method:
 def methods(tolerances: Sequence[float], scenes: int, few: int) -> list[Method]:
     """This solver at several tolerances, every rung of the ladder, references and peers.
 
-    scenes, few: scenes of each set for quick and for slow methods. The
-    paper's formulation on the paper's mesh gets one.
+    scenes, few: scenes of each set for quick and for slow methods. This solver's boundary elements
+    get five times the few, the paper's formulation on the paper's mesh one.
     """
-    found = [Method(MULTIPOLE, f"tolerance {t:.0e}", multipole(t), scenes) for t in tolerances]
+    found = [Method(MULTIPOLE, _at(t), solver("multipole", t), scenes) for t in tolerances]
+    found += [
+        Method(ELEMENTS, _at(t), solver("elements", t), min(scenes, 5 * few))
+        for t in tolerances
+        if t >= MESHED
+    ]
     for scheme, edges in RUNGS.items():
         for edge in edges:
             mesh = sphere_mesh(edge)
@@ -108,7 +116,7 @@ def time_against_error(
     error_median, error_95, error_max, covered (share of scenes whose estimate is at least the
     error) and estimate_over_error (median), both NaN for a method without estimates.
     """
-    exact, rows = exact or multipole(EXACT), []
+    exact, rows = exact or solver("multipole", EXACT), []
     for name, scenes in sets.items():
         truth = [exact(scene)[0] for scene in scenes]
         for method in methods:
@@ -207,11 +215,11 @@ def reflections(centres) -> np.ndarray:
     return reflected_forces(np.asarray(centres)[None, 1:] - centres[0])
 
 
-def multipole(tolerance: float) -> Callable:
-    """This solver at a tolerance, as `Method.forces`."""
+def solver(method: str, tolerance: float) -> Callable:
+    """This solver by one of its methods at a tolerance, as `Method.forces`."""
 
     def forces(centres):
-        solution = fixed_spheres(centres, tolerance=tolerance)
+        solution = fixed_spheres(centres, tolerance=tolerance, method=method)
         return solution.force, solution.error_estimate
 
     return forces
@@ -220,6 +228,10 @@ def multipole(tolerance: float) -> Callable:
 def _reference(centres):
     forces, estimate = reference_forces(centres, tolerance=EXACT)
     return forces, np.full(len(centres), estimate)
+
+
+def _at(tolerance: float) -> str:
+    return f"tolerance {tolerance:.0e}"
 
 
 def _plain(forces):

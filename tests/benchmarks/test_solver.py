@@ -6,8 +6,9 @@ import pytest
 from dustfall.benchmarks.solver import (
     Method,
     _plain,
-    multipole,
+    methods,
     rotne_prager,
+    solver,
     time_against_error,
     time_against_spheres,
 )
@@ -42,7 +43,7 @@ def test_errors_are_those_of_the_reference_sphere(scenes):
 
 
 def test_a_tighter_tolerance_has_the_smaller_error_and_an_estimate_that_covers_it(scenes):
-    found = [Method("ours", f"{t:g}", multipole(t), 4) for t in (1e-2, 1e-4, 1e-6)]
+    found = [Method("ours", f"{t:g}", solver("multipole", t), 4) for t in (1e-2, 1e-4, 1e-6)]
     seen = []
     table = time_against_error(
         {"dense": scenes}, found, repeats=1, progress=lambda *p: seen.append(p)
@@ -53,6 +54,19 @@ def test_a_tighter_tolerance_has_the_smaller_error_and_an_estimate_that_covers_i
     assert (table["error_max"] <= [1e-2, 1e-4, 1e-6]).all()
     assert (table["covered"] >= 0.75).all()
     assert (table["milliseconds"] > 0.0).all()
+
+
+def test_both_methods_of_the_solver_are_within_their_tolerances(scenes):
+    own = [m for m in methods([1e-2, 1e-3, 1e-6], 2, 1) if m.setting.startswith("tolerance ")]
+    table = time_against_error({"dense": scenes}, own, repeats=1)
+    tolerance = table["setting"].str.removeprefix("tolerance ").astype(float)
+    within = table.assign(within=table["error_max"] <= tolerance).groupby("method")["within"]
+    assert within.all().to_dict() == {
+        "multipoles": True, "boundary elements": True, "fundamental solutions": True,
+    }  # fmt: skip
+    assert within.size().to_dict() == {
+        "multipoles": 3, "boundary elements": 2, "fundamental solutions": 1,
+    }  # fmt: skip
 
 
 def test_cost_against_spheres_reports_the_slope_that_its_times_have():
