@@ -22,7 +22,8 @@ OTHER_JOBS = 40
 """Tables and figures, of which every campaign has one each."""
 
 SOLVE_SECONDS = {"multipole": 2e-3, "elements": 1.0, "paper": 10.0}
-"""One scene of six spheres by each method; it grows with their square. Boundary elements need from 0.1 to some seconds."""
+"""One scene of six spheres by each method; it grows with their square. Boundary elements need from
+0.1 to some seconds."""
 
 NETWORK_SECONDS = 5e-10
 """One multiplication by a weight, for one scene in one epoch, with its share of all else."""
@@ -31,7 +32,8 @@ STEP_SECONDS = {"neighbours": 2.5e-6, "all particles": 1.0e-5}
 """One particle in one step."""
 
 SCENE_BYTES = 1500
-"""A scene of five neighbours with its record of forces, its place in the data set and its predictions."""
+"""A scene of five neighbours with its record of forces, its place in the data set and its
+predictions."""
 
 STEP_BYTES = 400
 """A step in the series of a run."""

@@ -1,8 +1,10 @@
 """A rule watches just those library files that its script runs."""
 
+import ast
+
 import pytest
 
-from workflow.library import ROOT, WITHOUT_RESULTS, library_files
+from workflow.library import ROOT, WITHOUT_RESULTS, imports_in, library_files
 
 SCRIPTS = sorted((ROOT / "workflow/scripts").glob("*.py"))
 
@@ -50,6 +52,39 @@ def test_a_package_that_looks_for_its_modules_brings_them_all(tmp_path):
 def test_a_name_made_up_at_run_time_is_refused(tmp_path):
     with pytest.raises(ImportError, match=r"train_model from dustfall\.forces.*from its module"):
         files_of(tmp_path, "from dustfall.forces import train_model")
+
+
+def imports_of_the_parser(code: str) -> set[tuple[str, tuple[str, ...]]]:
+    found = set()
+    for node in ast.walk(ast.parse(code)):
+        names = [alias.name for alias in getattr(node, "names", []) if isinstance(alias, ast.alias)]
+        if isinstance(node, ast.ImportFrom):
+            found.add(("." * node.level + (node.module or ""), tuple(names)))
+        elif isinstance(node, ast.Import):
+            found |= {(name, ()) for name in names}
+    return found
+
+
+def test_imports_are_those_that_the_parser_finds():
+    files = [*ROOT.glob("dustfall/**/*.py"), *ROOT.glob("workflow/**/*.py")]
+    assert len(files) > 200
+    for file in files:
+        code = file.read_text(encoding="utf-8")
+        assert {(a, tuple(b)) for a, b in imports_in(code)} == imports_of_the_parser(code), file
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import a.b as c, d",
+        "from . import a",
+        "from ..a.b import c as d, e",
+        "from a import (  # first (of two)\n    b,  # last\n    c as d,\n)",
+        "if a:\n\timport b\n\tfrom c import d # all",
+    ],
+)
+def test_imports_are_found_however_they_are_written(code):
+    assert {(a, tuple(b)) for a, b in imports_in(code)} == imports_of_the_parser(code)
 
 
 def test_other_packages_do_not_count(tmp_path):
