@@ -7,8 +7,8 @@ from dustfall.streams import Purpose, stream
 from dustfall.units import NEIGHBOURS, SPHERE_VOLUME
 
 LAWS = ("uniform", "ball", "contact")
-"""Radial laws: `uniform`, radii uniform between contact and the farthest distance (the law
-that reproduces the paper's statistics); `ball`, points uniform in the ball (a dilute random suspension);
+"""Radial laws: `uniform`, radii uniform between contact and the farthest neighbour (the law that
+reproduces the paper's statistics); `ball`, points uniform in the ball (a dilute random suspension);
 `contact`, as `uniform`, but one neighbour nearly touches the reference sphere."""
 
 NEAR_CONTACT = (1e-3, 0.1)
