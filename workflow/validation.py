@@ -231,7 +231,8 @@ def crowds(stress: pd.DataFrame) -> pd.DataFrame:
     """What could fool the error estimate: one row a family of scenes, over all tolerances.
 
     over_tolerance is the largest error of the converged in tolerances, over_estimate that of all
-    over its estimate; excess, of the difference from fundamental solutions over their own estimate.
+    over its estimate; difference, that from fundamental solutions, and peer_estimate, the largest
+    of what these estimate of their own error.
     """
     found = stress[stress["test"] == "crowd"]
     converged = found["status"] == str(Status.CONVERGED)
@@ -239,7 +240,6 @@ def crowds(stress: pd.DataFrame) -> pd.DataFrame:
         converged=converged,
         over_tolerance=(found["error"] / found["tolerance"]).where(converged),
         over_estimate=found["error"] / found["estimate"],
-        excess=found["difference"] / found["peer_estimate"],
     )
     return found.groupby("case", sort=False, as_index=False).agg(
         scenes=("scene", "nunique"),
@@ -249,7 +249,8 @@ def crowds(stress: pd.DataFrame) -> pd.DataFrame:
         over_tolerance=("over_tolerance", "max"),
         over_estimate=("over_estimate", "max"),
         compared=("difference", "count"),
-        excess=("excess", "max"),
+        difference=("difference", "max"),
+        peer_estimate=("peer_estimate", "max"),
     )
 
 
