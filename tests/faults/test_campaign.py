@@ -213,9 +213,10 @@ def test_a_folder_that_cannot_be_written_is_told(whole, tmp_path, ledger):
     count(ledger, "a folder of results that cannot be written", [outcome])
 
 
-def test_a_campaign_half_deleted_is_made_whole(whole, tmp_path, ledger):
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_campaign_half_deleted_is_made_whole(whole, tmp_path, ledger, seed):
     project = copy_of(whole, tmp_path)
-    rng = np.random.default_rng(1)
+    rng = np.random.default_rng(seed)
     files = sorted(path for path in (tmp_path / "results").rglob("*") if path.is_file())
     for path in files:
         if rng.random() < 0.5:
