@@ -40,6 +40,7 @@ if "SLURM_JOB_ID" in os.environ:
 
 
 LINE = terminal.follow(workflow)
+stops.tell_interrupts(LINE.stop)
 
 
 report: "workflow/report/workflow.rst"

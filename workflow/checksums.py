@@ -36,7 +36,7 @@ def check(files: Iterable[str | Path]) -> None:
     for path in filter(_is_result, map(Path, files)):
         complaint = _complaint(path)
         if complaint:
-            raise DamageError(complaint)
+            raise DamageError(f"{complaint}; `snakemake verify` names all such files")
 
 
 def verify() -> Iterator[tuple[Path, str]]:

@@ -8,7 +8,11 @@ import errno
 import os
 import re
 import shlex
+import signal
 import sys
+import threading
+import warnings
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -70,6 +74,34 @@ def require_writable() -> None:
         read_only = os.statvfs(RESULTS).f_flag & os.ST_RDONLY
         cause = CAUSES[errno.EROFS if read_only else errno.EACCES]
         sys.exit(_last_words(f"{RESULTS}: {cause}"))
+
+
+def tell_interrupts(end_line: Callable[[], None]) -> None:
+    """Have an interrupt end with a sentence where Snakemake ends with a traceback, or with nothing.
+
+    So it does while it plans, until its scheduler waits for jobs and answers signals itself.
+    `end_line` ends what is shown of the run.
+    """
+    usual = sys.excepthook
+
+    def hook(kind, error, trace) -> None:
+        if issubclass(kind, KeyboardInterrupt):
+            end_line()
+            warnings.simplefilter("ignore")  # of what is cut short
+            print(_last_words(str(error)), file=sys.stderr, flush=True)
+        else:
+            usual(kind, error, trace)
+
+    def end(number, frame) -> None:
+        raise KeyboardInterrupt(f"ended by {signal.Signals(number).name}")
+
+    sys.excepthook = hook
+    if threading.current_thread() is threading.main_thread():
+        for number in (signal.SIGINT, signal.SIGTERM):
+            if signal.getsignal(number) != signal.SIG_IGN:
+                # Python's own handler of SIGINT would give way to that of asyncio, which planning
+                # does not wait for.
+                signal.signal(number, end)
 
 
 def announce(logs) -> None:

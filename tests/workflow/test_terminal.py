@@ -4,8 +4,10 @@ import errno
 import os
 import pty
 import re
+import signal
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -49,6 +51,30 @@ def test_a_run_leaves_a_line_of_its_jobs_and_a_failure_its_reason_last(project):
     assert lines[-1].startswith("Stopped: own_data: own.csv: force of scene 0")
     assert "\x1b" not in lines[-1]
     assert len(lines) < 20
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_while_snakemake_plans_is_told_in_a_sentence(project, number):
+    run = subprocess.Popen(
+        [sys.executable, "-m", "snakemake", "-n", "--", "all"],
+        cwd=project.folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        # What runs the tests in the background may ignore it.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    assert run.stdout
+    shown = []
+    for line in run.stdout:
+        shown.append(line)
+        if line.startswith("Building DAG"):
+            time.sleep(0.2)  # Snakemake passes over an interrupt of its words
+            run.send_signal(number)
+    run.stdout.close()
+    assert run.wait() != 0
+    assert shown[-1] == f"Stopped: ended by {number.name}. To go on: snakemake -n -- all\n"
+    assert not any("Traceback" in line for line in shown)
 
 
 def run_of(seconds: float, jobs: int, cores: int) -> Run:
