@@ -73,10 +73,9 @@ def gaps(tolerances, sizes=(1.0, 0.1, 1e-2, 1e-3, 1e-4), progress=None):
     error: largest of all spheres, over 24, against the exact solution for a pair and otherwise
     against a solve with FINE_DEGREE. estimate: the solver's own, largest; status: its word on it.
     """
-    rows: list[dict] = []
+    rows = []
     # What is compiled on the first call is none of its seconds.
-    pair = 2.0 * CLUSTERS["pair"]
-    _solved(pair, np.zeros((2, 3)), tolerances[0])
+    _solved(2.0 * CLUSTERS["pair"], np.zeros((2, 3)), tolerances[0])
     for name, shape in CLUSTERS.items():
         for gap in sizes:
             centres = (1.0 + gap) * shape
