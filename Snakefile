@@ -80,6 +80,8 @@ rule all:
         "results/dataset/summary.json",
         SOLVER,
         "results/model/evaluation.csv",
+        # Also of those cases whose series alone tells something, so that none is lost unseen.
+        expand("results/sedimentation/{case}.nc", case=CASES),
         "results/analysis/independence_of_n.csv",
         "results/analysis/neighbour_changes.csv",
         "results/analysis/local_volume_fraction.csv",

@@ -1,5 +1,7 @@
 """The plan: which jobs a configuration asks for, and under which names."""
 
+import re
+
 import pytest
 import yaml
 
@@ -86,6 +88,20 @@ def test_the_paper_takes_the_expected_jobs_and_fewer_than_a_thousand(project):
     }
     assert jobs == expected
     assert sum(jobs.values()) < 1000
+
+
+def test_all_asks_for_every_file_so_that_one_that_is_lost_is_made_again(project):
+    words = project.dry_run("--configfile", "config/smoke.yaml", "--", "all")
+    made, asked = (
+        {
+            name
+            for line in re.findall(f"^    {kind}: (.*)$", words, re.M)
+            for name in line.split(", ")
+        }
+        for kind in ("output", "input")
+    )
+    assert len(made) > 150
+    assert made <= asked
 
 
 def test_the_paper_to_the_letter_can_be_planned(project):

@@ -118,7 +118,11 @@ MESHES = expand(
     "results/meshes/{scene}.{ending}", scene=plan.kept_meshes(config), ending=["msh", "vtu"]
 )
 # What tells of the solver, and belongs to no data set of one's own.
-SOLVER = [] if config["dataset"]["file"] else ["results/analysis/audit.csv", *MESHES]
+SOLVER = (
+    []
+    if config["dataset"]["file"]
+    else ["results/analysis/audit.csv", "results/analysis/grid_convergence.csv", *MESHES]
+)
 SOLVER_FIGURES = [] if config["dataset"]["file"] else ["mesh_study", "audit", "scene_meshes"]
 CASES = plan.cases(config)
 
