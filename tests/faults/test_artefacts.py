@@ -138,8 +138,8 @@ def test_no_file_of_a_campaign_is_damaged_unseen(whole, tmp_path, ledger, monkey
 STAGES = {
     "results/scenes/uniform-0000.h5": "results/stokes/uniform-0000.h5",
     "results/stokes/uniform-0000.h5": "results/dataset/forces.h5",
-    "results/dataset/forces.h5": "results/sweep/streamwise/10-10.json",
-    "results/sweep/streamwise/10-10.json": "results/sweep/winner.json",
+    "results/dataset/forces.h5": "results/sweep/streamwise/10_10.json",
+    "results/sweep/streamwise/10_10.json": "results/sweep/winner.json",
     "results/sweep/winner.json": "results/model/idnn.safetensors",
     "results/model/anchored.safetensors": "results/model/evaluation.csv",
     "results/model/predictions.h5": "results/figures/error_by_distance.png",
