@@ -227,7 +227,13 @@ def _tensors(networks):
 
 
 def _network(tensors, header, component):
-    if header["radial_input"] not in RADIAL_INPUTS or not header["largest_distance"] > 0:
+    largest = header["largest_distance"]
+    # Whole numbers of JSON may be too long for a kernel.
+    if (
+        header["radial_input"] not in RADIAL_INPUTS
+        or not isinstance(largest, float)
+        or not largest > 0
+    ):
         raise ValueError("radial_input or largest_distance has no allowed value")
     neighbours = header["neighbours"]
     if not (isinstance(neighbours, int) and 1 <= neighbours <= MOST_NEIGHBOURS):

@@ -200,6 +200,7 @@ def test_files_of_another_layout_are_refused(models, tmp_path):
         lambda header, tensors: header.update(kind="pairs"),
         lambda header, tensors: header.pop("layers"),
         lambda header, tensors: header.update(largest_distance="far"),
+        lambda header, tensors: header.update(largest_distance=10**30),
         lambda header, tensors: header.update(neighbours=0),
     ):
         models["idnn"].save(path)
