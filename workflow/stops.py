@@ -88,7 +88,7 @@ def tell_interrupts(end_line: Callable[[], None]) -> None:
         if issubclass(kind, KeyboardInterrupt):
             end_line()
             warnings.simplefilter("ignore")  # of what is cut short
-            print(_last_words(str(error)), file=sys.stderr, flush=True)
+            print(_last_words(str(error) or "interrupted"), file=sys.stderr, flush=True)
         else:
             usual(kind, error, trace)
 

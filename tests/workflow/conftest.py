@@ -78,6 +78,12 @@ def jobs_of(words: str) -> dict[str, int]:
     return jobs
 
 
+def files_of(words: str, kind: str) -> set[str]:
+    """Files that the jobs of a dry run have as "input" or as "output"."""
+    lines = re.findall(f"^    {kind}: (.*)$", words, re.M)
+    return {name for line in lines for name in line.split(", ")}
+
+
 @pytest.fixture
 def project(tmp_path) -> Project:
     return Project(tmp_path)
@@ -97,11 +103,10 @@ def rehearsal(tmp_path_factory) -> Project:
     rehearsal = Project(tmp_path_factory.mktemp("rehearsal"))
     arguments = ("--configfile", "config/smoke.yaml")
     words = rehearsal.dry_run(*arguments, "--", "all")
-    for line in re.findall("^    output: (.*)$", words, re.M):
-        for name in line.split(", "):
-            path = rehearsal.folder / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.touch()
+    for name in files_of(words, "output"):
+        path = rehearsal.folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
     rehearsal.rules = set(jobs_of(words))
     rehearsal.run(*arguments, "--touch", "--forceall", "--", "all")
     return rehearsal

@@ -1,11 +1,10 @@
 """The plan: which jobs a configuration asks for, and under which names."""
 
-import re
-
 import pytest
 import yaml
 
 from dustfall.sedimentation import Schedule
+from tests.workflow.conftest import files_of
 from workflow import plan
 from workflow.configuration import configure
 
@@ -92,16 +91,9 @@ def test_the_paper_takes_the_expected_jobs_and_fewer_than_a_thousand(project):
 
 def test_all_asks_for_every_file_so_that_one_that_is_lost_is_made_again(project):
     words = project.dry_run("--configfile", "config/smoke.yaml", "--", "all")
-    made, asked = (
-        {
-            name
-            for line in re.findall(f"^    {kind}: (.*)$", words, re.M)
-            for name in line.split(", ")
-        }
-        for kind in ("output", "input")
-    )
+    made = files_of(words, "output")
     assert len(made) > 150
-    assert made <= asked
+    assert made <= files_of(words, "input")
 
 
 def test_the_paper_to_the_letter_can_be_planned(project):
