@@ -4,7 +4,7 @@ import math
 import numbers
 
 import numpy as np
-from scipy.spatial.distance import cdist
+import scipy
 
 from dustfall.units import CONTACT, RADIUS
 
@@ -170,6 +170,6 @@ def checked_tolerance(tolerance, lowest: float, highest: float) -> float:
 
 def centre_distances(centres) -> np.ndarray:
     """(n, n) centre distances [d_p], inf on the diagonal."""
-    distance = cdist(centres, centres)
+    distance = scipy.spatial.distance.cdist(centres, centres)
     distance.flat[:: len(distance) + 1] = np.inf
     return distance

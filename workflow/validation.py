@@ -18,8 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+import scipy
 import yaml
-from scipy import stats
 
 from dustfall.analysis.references import (
     MATCHED_GAMMA,
@@ -442,7 +442,7 @@ def closures(figure: pd.DataFrame) -> pd.DataFrame:
         width = cells["x"].diff().iloc[1]
         row["crowded"] = width * cells.loc[cells["x"] < CROWDED_CELL, "y"].sum()
         shape, scale = MATCHED_GAMMA
-        row["random_crowded"] = stats.gamma.cdf(CROWDED_CELL, shape, scale=scale)
+        row["random_crowded"] = scipy.stats.gamma.cdf(CROWDED_CELL, shape, scale=scale)
         rows.append(row)
     return pd.DataFrame(rows).sort_values(["model", "n"], ignore_index=True)
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pandas as pd
-from scipy import stats
+import scipy
 
 from dustfall.forces.frames import check_neighbours, spherical_coordinates
 from dustfall.units import AXES, COMPONENTS
@@ -41,7 +41,7 @@ def spearman_by_neighbours(neighbours, force, coordinates="spherical") -> pd.Dat
     values = values.reshape(samples, -1)
     if (np.ptp(values, axis=0) == 0).any() or (np.ptp(force, axis=0) == 0).any():
         raise ValueError("a coordinate or force component is the same in all samples: no rank")
-    rho = stats.spearmanr(values, force).statistic[: values.shape[1], values.shape[1] :]
+    rho = scipy.stats.spearmanr(values, force).statistic[: values.shape[1], values.shape[1] :]
     rho = rho.reshape(-1, 3, 3)
     mean = np.abs(rho).cumsum(axis=0) / np.arange(1, len(rho) + 1)[:, None, None]
     rows = [

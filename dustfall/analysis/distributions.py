@@ -2,7 +2,7 @@
 
 import numpy as np
 import pandas as pd
-from scipy import stats
+import scipy
 
 from dustfall.analysis.references import PAPER_FORCE_SUMMARY
 from dustfall.units import AXES, COMPONENTS, STOKES_DRAG
@@ -10,12 +10,12 @@ from dustfall.units import AXES, COMPONENTS, STOKES_DRAG
 FEWEST_SAMPLES = 5
 """A decade or a slice with fewer samples than this has no density worth drawing."""
 
-LAWS = {"laplace": (stats.laplace, 0.93), "normal": (stats.norm, 0.895)}
-"""Laws that are fitted to samples, and their Kolmogorov-Smirnov levels: a law fitted to m of its
-own independent samples lies farther from them than this over sqrt(m) in one case of twenty (one
-that was not fitted: 1.36). Laplace: simulated, 0.937 and 0.935, each to 0.005, at m = 1,000 and
-8,000 (method: Puig & Stephens 2000, Technometrics 42, 417). Normal: Lilliefors 1967, with the
-number of Stephens 1974 (J. Am. Stat. Assoc. 69, 730); simulated 0.903, to 0.005."""
+LAWS = {"laplace": ("laplace", 0.93), "normal": ("norm", 0.895)}
+"""Laws that are fitted to samples, as scipy names them, and their Kolmogorov-Smirnov levels: a law
+fitted to m of its own independent samples lies farther from them than this over sqrt(m) in one case
+of twenty (one that was not fitted: 1.36). Laplace: simulated, 0.937 and 0.935, each to 0.005, at
+m = 1,000 and 8,000 (method: Puig & Stephens 2000, Technometrics 42, 417). Normal: Lilliefors 1967,
+with the number of Stephens 1974 (J. Am. Stat. Assoc. 69, 730); simulated 0.903, to 0.005."""
 
 SILVERMAN = (0.9, 1.34)
 """Width of a Gaussian kernel over m^(-1/5) min(deviation, interquartile range / 1.34), and that
@@ -89,7 +89,7 @@ def force_distributions(volume_fraction, force, points=400) -> pd.DataFrame:
             if column in COMPONENTS["lateral"]:
                 x, density = _kernel_density(values, points)
                 curve |= {
-                    "laplace_density": stats.laplace.pdf(x, law["location"], law["scale"]),
+                    "laplace_density": scipy.stats.laplace.pdf(x, law["location"], law["scale"]),
                     "laplace_ks": law["ks"],
                     "laplace_ks_level": law["ks_level"],
                 }
@@ -145,7 +145,7 @@ def force_summary(volume_fraction, force) -> pd.DataFrame:
                     "laplace_ks_level": laws["laplace"]["ks_level"],
                     "normal_ks": laws["normal"]["ks"],
                     "normal_ks_level": laws["normal"]["ks_level"],
-                    "excess_kurtosis": stats.kurtosis(values),
+                    "excess_kurtosis": scipy.stats.kurtosis(values),
                 }
             for quantity, value in figures.items():
                 paper = PAPER_FORCE_SUMMARY.get((quantity, component), np.nan)
@@ -176,10 +176,11 @@ def fit(law: str, values) -> dict[str, float]:
     values = np.asarray(values, dtype=float).ravel()
     if values.size < 2 or np.ptp(values) == 0:
         raise ValueError(f"a {law} law needs at least two different values, not {values.size}")
-    distribution, level = LAWS[law]
+    name, level = LAWS[law]
+    distribution = getattr(scipy.stats, name)
     location, scale = distribution.fit(values)
     # The p-value, which holds for a law that was not fitted, is not used; this one costs the least.
-    found = stats.ks_1samp(values, distribution.cdf, (location, scale), method="asymp")
+    found = scipy.stats.ks_1samp(values, distribution.cdf, (location, scale), method="asymp")
     return {
         "location": float(location),
         "scale": float(scale),
@@ -241,7 +242,7 @@ def _kernel_density(values, points, bound=np.inf):
     if deviation == 0:
         raise ValueError(f"all {len(values)} forces of a slice are {values[0]}: no density")
     # Half of the values may be equal (forces 24 of a dilute slice): then the deviation counts.
-    spread = min(deviation, stats.iqr(values) / normal_range) or deviation
+    spread = min(deviation, scipy.stats.iqr(values) / normal_range) or deviation
     values = np.sort(values)
     widths = np.fmax(factor * spread * len(values) ** -0.2, _nearest_distance(values))
     low = (values - KERNEL_REACH * widths).min()

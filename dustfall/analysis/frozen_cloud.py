@@ -2,8 +2,7 @@
 
 import numpy as np
 import pandas as pd
-from scipy import stats
-from scipy.spatial import cKDTree
+import scipy
 
 from dustfall.forces.formulas import FORMULAS
 from dustfall.sedimentation.neighbours import nearest_neighbours
@@ -41,7 +40,7 @@ def drag_among_nearest(positions, length: float, references, count: int) -> np.n
 
     Raises ValueError where these would reach beyond half the box, where images are met twice.
     """
-    tree = cKDTree(positions % length, boxsize=length)
+    tree = scipy.spatial.cKDTree(positions % length, boxsize=length)
     distance, index = tree.query(positions[references] % length, count + 1)
     if distance.max() > length / 2:
         raise ValueError(
@@ -128,7 +127,7 @@ def frozen_cloud_table(
                 progress(case * clouds + cloud + 1, len(volume_fractions) * clouds)
         for (panel, source, x), values in found.items():
             mean = np.mean(values)
-            half = stats.t.ppf(0.975, clouds - 1) * np.std(values, ddof=1) / np.sqrt(clouds)
+            half = scipy.stats.t.ppf(0.975, clouds - 1) * np.std(values, ddof=1) / np.sqrt(clouds)
             head = {"panel": panel, "source": source, "volume_fraction": phi, "x": x}
             rows.append(head | {"y": mean, "low": mean - half, "high": mean + half})
         head = {"panel": "settling", "source": "Batchelor 1972", "volume_fraction": phi, "x": phi}

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pandas as pd
-from scipy import stats
+import scipy
 
 from dustfall.analysis.settling import PARTICLE_MEANS
 from dustfall.analysis.time_averages import FEWEST_SEEDS
@@ -29,7 +29,7 @@ def welch_anova(means, errors, freedoms) -> tuple[float, float, float, float]:
     uncertain = np.sum((1 - share) ** 2 / freedoms)
     statistic = scatter / (1 + 2 * (k - 2) / (k**2 - 1) * uncertain)
     second = (k**2 - 1) / (3 * uncertain)
-    return float(statistic), k - 1, float(second), float(stats.f.sf(statistic, k - 1, second))
+    return float(statistic), k - 1, float(second), float(scipy.stats.f.sf(statistic, k - 1, second))
 
 
 def independence_of_n(steady: pd.DataFrame) -> pd.DataFrame:

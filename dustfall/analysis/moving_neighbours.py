@@ -4,8 +4,8 @@ from collections.abc import Iterable
 
 import numpy as np
 import pandas as pd
+import scipy
 import xarray as xr
-from scipy.spatial import cKDTree
 
 from dustfall.analysis.settling import case_of, from_time, steadiness
 from dustfall.analysis.time_averages import mean_with_interval
@@ -68,4 +68,5 @@ def _close_pairs(frame) -> int:
     side = np.asarray(frame["cell_lengths"], dtype=float)
     position = np.mod(np.asarray(frame["coordinates"], dtype=float), side)
     # The remainder of a tiny negative number is the side itself.
-    return len(cKDTree(np.where(position < side, position, 0.0), boxsize=side).query_pairs(CLOSE))
+    tree = scipy.spatial.cKDTree(np.where(position < side, position, 0.0), boxsize=side)
+    return len(tree.query_pairs(CLOSE))

@@ -4,9 +4,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pandas as pd
+import scipy
 import xarray as xr
-from scipy import stats
-from scipy.spatial import cKDTree
 
 from dustfall.analysis.settling import case_of, from_time, with_starts
 from dustfall.scenes import volume_fraction
@@ -47,7 +46,7 @@ def pair_distribution(positions, length: float, edges) -> tuple[np.ndarray, np.n
     positions = np.ascontiguousarray(positions, dtype=float)
     n = len(positions)
     here = folded(positions, length)
-    pair = cKDTree(here, boxsize=length).query_pairs(edges[-1], output_type="ndarray")
+    pair = scipy.spatial.cKDTree(here, boxsize=length).query_pairs(edges[-1], output_type="ndarray")
     apart = here[pair[:, 0]] - here[pair[:, 1]]
     apart -= length * np.rint(apart / length)
     square = (apart**2).sum(axis=1)
@@ -87,7 +86,7 @@ def pair_distribution_table(
         half = 0.0
         if len(found) > 1:
             error = found[:, 0].std(axis=0, ddof=1) / np.sqrt(len(found))
-            half = stats.t.ppf(0.975, len(found) - 1) * error
+            half = scipy.stats.t.ppf(0.975, len(found) - 1) * error
         columns = {"distance": np.sqrt(edges[1:] * edges[:-1]), "density": density}
         columns |= {"low": np.maximum(density - half, 0.0), "high": density + half}
         seen = np.isfinite(found[:, 1])

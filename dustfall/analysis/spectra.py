@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+import scipy
 import xarray as xr
-from scipy import signal, special, stats
 
 from dustfall.analysis.settling import (
     case_of,
@@ -78,12 +78,12 @@ def power_spectral_density(
         raise ValueError(f"the method is {method!r}; allowed: {', '.join(METHODS)}")
     x = x - x.mean(axis=-1, keepdims=True)
     if method == "periodogram":
-        return signal.periodogram(x, 1 / interval, window=window, detrend=False)
+        return scipy.signal.periodogram(x, 1 / interval, window=window, detrend=False)
     segment = min(max(SHORTEST_SEGMENT, samples // 8), samples) if segment is None else segment
     if not 4 <= segment <= samples:
         raise ValueError(f"a Welch segment has {segment} samples; allowed: 4 to {samples}")
     window = "hann" if window == "boxcar" else window
-    return signal.welch(x, 1 / interval, window=window, nperseg=segment, detrend=False)
+    return scipy.signal.welch(x, 1 / interval, window=window, nperseg=segment, detrend=False)
 
 
 def energy_spectrum(
@@ -140,8 +140,8 @@ def spectral_slope(kappa, energy, ordinates=None, limits=(0.0, np.inf)) -> Power
         )
     count = count[inside]
     x = np.log(kappa[inside])
-    y = np.log(energy[inside]) - special.digamma(count) + np.log(count)
-    weight = 1 / special.polygamma(1, count)
+    y = np.log(energy[inside]) - scipy.special.digamma(count) + np.log(count)
+    weight = 1 / scipy.special.polygamma(1, count)
     centre = np.average(x, weights=weight)
     spread = np.sum(weight * (x - centre) ** 2)
     level = np.average(y, weights=weight)
@@ -308,7 +308,7 @@ def _with_slope(kappa, energy, slab, limits) -> pd.DataFrame:
         for t, c in zip(totals, counts, strict=True)
     ]
     error = np.sqrt((SLABS - 1) * np.var(without))
-    half = stats.t.ppf(0.975, SLABS - 1) * error
+    half = scipy.stats.t.ppf(0.975, SLABS - 1) * error
     ends = np.clip(limits, kappa[0], kappa[-1])
     table = pd.concat(
         [

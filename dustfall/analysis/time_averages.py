@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+import scipy
 
 FEWEST_BATCHES = 5
 MOST_BATCHES = 30
@@ -32,7 +32,8 @@ class Mean:
     def half_width(self) -> float:
         """Half the width of the confidence interval (Student's t)."""
         return float(
-            stats.t.ppf(0.5 + self.confidence / 2, self.degrees_of_freedom) * self.standard_error
+            scipy.stats.t.ppf(0.5 + self.confidence / 2, self.degrees_of_freedom)
+            * self.standard_error
         )
 
 
@@ -65,7 +66,7 @@ def mean_with_interval(values, confidence=0.95) -> Mean:
     x = _checked(values)
     length = correlation_length(x)
     means, _ = _batch_means(x, length)
-    error = stats.sem(means)
+    error = scipy.stats.sem(means)
     return Mean(float(x.mean()), float(error), len(means) - 1, length, confidence)
 
 
@@ -105,7 +106,7 @@ class Drift:
             return 1.0
         with np.errstate(divide="ignore"):
             t = np.abs(self.change) / np.float64(self.standard_error)
-        return float(2 * stats.t.sf(t, self.degrees_of_freedom))
+        return float(2 * scipy.stats.t.sf(t, self.degrees_of_freedom))
 
 
 def drift(values) -> Drift:
@@ -121,7 +122,7 @@ def drift(values) -> Drift:
     place = np.linspace(0, 1, x.size)
     along = np.polynomial.Polynomial.fit(place, x, 1)
     means, centres = _batch_means(x, correlation_length(x - along(place)))
-    line = stats.linregress(centres, means)
+    line = scipy.stats.linregress(centres, means)
     rounding = abs(line.slope) <= ROUNDING * np.abs(x).max()
     return Drift(
         change=0.0 if rounding else float(line.slope),

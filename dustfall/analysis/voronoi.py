@@ -4,8 +4,8 @@ from collections.abc import Iterable
 
 import numpy as np
 import pandas as pd
+import scipy
 import xarray as xr
-from scipy import stats
 
 from dustfall.analysis.references import (
     MATCHED_GAMMA,
@@ -122,7 +122,7 @@ def random_sphere_variance(
         positions = random_positions(rng, particles, volume_fraction)
         volumes = voronoi_volumes(positions, box_length(particles, volume_fraction))
         found.append(volumes.var() / volumes.mean() ** 2)
-    half = stats.t.ppf(0.975, clouds - 1) * np.std(found, ddof=1) / np.sqrt(clouds)
+    half = scipy.stats.t.ppf(0.975, clouds - 1) * np.std(found, ddof=1) / np.sqrt(clouds)
     mean = float(np.mean(found))
     return {"value": mean, "low": mean - half, "high": mean + half}
 
@@ -207,7 +207,7 @@ def _interval(by_snapshot, by_particle, seed, length, correlated=1.0):
     """The wider one of the intervals of a mean from its snapshots (k, …) and particles (n, …)."""
     low, high = block_bootstrap(by_snapshot, seed, length)
     error = correlated * by_particle.std(axis=0, ddof=1) / np.sqrt(len(by_particle))
-    half = stats.norm.ppf(0.975) * error
+    half = scipy.stats.norm.ppf(0.975) * error
     mean = by_snapshot.mean(axis=0)
     return np.fmin(low, mean - half), np.fmax(high, mean + half)
 
@@ -240,7 +240,7 @@ def voronoi_pdf_table(cells: Iterable[xr.Dataset], seed: int) -> pd.DataFrame:
         "gamma, k = 5, theta = 0.2": PAPER_GAMMA,
         "gamma, k = 5.59": MATCHED_GAMMA,
     }.items():
-        density = stats.gamma.pdf(x, shape, scale=scale)
+        density = scipy.stats.gamma.pdf(x, shape, scale=scale)
         tables.append(pd.DataFrame({"source": name, "volume": x, "density": density}))
     table = pd.concat(tables, ignore_index=True)
     return table[["source", "galileo_multiple", "volume", "density", "low", "high"]]

@@ -5,8 +5,8 @@ import warnings
 from pathlib import Path
 
 import numpy as np
+import scipy
 from numba import njit
-from scipy.spatial import cKDTree
 
 from dustfall.sedimentation.neighbours import FARTHEST, sort_by_cell
 from dustfall.sedimentation.state import State, box_length
@@ -251,11 +251,11 @@ def _refuse_overlaps(path: Path, position: np.ndarray, length: float) -> None:
     _, cell, count = np.unique(np.floor(wrapped), axis=0, return_inverse=True, return_counts=True)
     if count.max() > MOST_IN_A_CELL:
         rows = np.flatnonzero(cell.ravel() == count.argmax())[: MOST_IN_A_CELL + 1]
-        distance, nearest = cKDTree(wrapped[rows]).query(wrapped[rows], k=2)
+        distance, nearest = scipy.spatial.cKDTree(wrapped[rows]).query(wrapped[rows], k=2)
         nearest = rows[nearest]
     else:
         rows = np.arange(len(position))
-        distance, nearest = cKDTree(wrapped, boxsize=length).query(wrapped, k=2)
+        distance, nearest = scipy.spatial.cKDTree(wrapped, boxsize=length).query(wrapped, k=2)
     closest = distance[:, 1].argmin()
     if distance[closest, 1] < CONTACT - TOUCH:
         i, j = sorted((int(rows[closest]), int(nearest[closest, 1])))

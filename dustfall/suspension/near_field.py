@@ -9,9 +9,8 @@ import math
 from functools import lru_cache
 
 import numpy as np
+import scipy
 from numba import njit
-from scipy.interpolate import PchipInterpolator
-from scipy.spatial import cKDTree
 
 from dustfall.suspension.conjugate_gradients import conjugate_gradients
 from dustfall.suspension.cube import folded
@@ -71,7 +70,7 @@ def relative_resistance() -> tuple[np.ndarray, np.ndarray]:
     unit, dyad = np.array([pair_coefficients(CONTACT + g) for g in gap]).T
     along = [approach_resistance(g) for g in gap] - 1 / (1 - unit - dyad)
     lacking = [f - 1 / (1 - pair_coefficients(CONTACT + g)[0]) for g, f in ACROSS.items()]
-    across = PchipInterpolator(np.log(list(ACROSS)), lacking)(np.log(gap))
+    across = scipy.interpolate.PchipInterpolator(np.log(list(ACROSS)), lacking)(np.log(gap))
     return gap, np.stack([along, across], axis=1)
 
 
@@ -98,7 +97,7 @@ class NearField:
     def __init__(self, position: np.ndarray, side: float, way: np.ndarray, stiff: float):
         if side <= 2 * REACH:
             raise ValueError(f"side of the cube is {side}: more than {2 * REACH} d_p is needed")
-        tree = cKDTree(folded(position, side), boxsize=side)
+        tree = scipy.spatial.cKDTree(folded(position, side), boxsize=side)
         # As far as two particles can see each other come, and less than half the side.
         fastest = 2 * np.linalg.norm(way - way.mean(axis=0), axis=1).max()
         reach = min(max(REACH, CONTACT + fastest), side / 2)

@@ -5,6 +5,7 @@ inputs are checked, outputs get their checksums, and a job that stops says why.
 """
 
 import atexit
+import gc
 import os
 import signal
 import sys
@@ -14,6 +15,9 @@ from collections.abc import Callable
 from dustfall.files import remove_leftovers
 from dustfall.progress import Progress
 from workflow import checksums, stops
+
+# Imports make half a million objects and no garbage: looking for it takes a tenth of their time.
+gc.disable()
 
 
 def start(job) -> Callable[..., Callable[[int, int], None]]:
@@ -33,6 +37,7 @@ def start(job) -> Callable[..., Callable[[int, int], None]]:
             os.dup2(file.fileno(), stream.fileno())
             stream.reconfigure(line_buffering=True)
 
+    gc.enable()
     _end_with_a_sentence(job)
     for path in job.output:
         remove_leftovers(path)
