@@ -38,7 +38,8 @@ slurm-test: environment
 # Kills, full disks and damage by the hundred, on a machine that is otherwise idle; their counts go
 # into the table of docs/faults.md.
 fault-test: environment
-	FAULT_TABLE=docs/faults.md $(VENV)/bin/python -m pytest tests/faults -m faults
+	FAULT_TABLE=docs/faults.md $(VENV)/bin/python -m pytest tests/faults -m faults \
+		-n 2 --dist loadfile --no-loadscope-reorder
 
 docs: environment
 	NO_MKDOCS_2_WARNING=1 $(VENV)/bin/python -m mkdocs build

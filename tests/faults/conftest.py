@@ -3,8 +3,12 @@
 The full campaign of faults is `make fault-test`, which writes its counts into docs/faults.md. On a
 slow machine environment variables make it smaller: FAULT_KILLS, FAULT_TARGET (what the campaign
 makes), FAULT_FLIPS. The table says how many were tried.
+
+Two processes run it. Stops take turns with starts of Snakemake, which use one core; so the other
+process has the undisturbed campaign and what is done to copies of it.
 """
 
+import fcntl
 import multiprocessing
 import os
 import shutil
@@ -13,6 +17,7 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -52,7 +57,16 @@ def ledger() -> Iterator[dict[str, Counter]]:
     counts: dict[str, Counter] = {}
     yield counts
     if TABLE:
-        write_table(Path(TABLE), counts)
+        with one_at_a_time(Path(TABLE)):
+            write_table(Path(TABLE), counts)
+
+
+@contextmanager
+def one_at_a_time(file: Path) -> Iterator[None]:
+    """Keep other processes from what `file` stands for; it has to be there."""
+    with open(file, "rb") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
 
 
 def write_table(page: Path, counts: dict[str, Counter]) -> None:
@@ -118,9 +132,17 @@ def count(ledger: dict[str, Counter], fault: str, outcomes: list[str]) -> None:
 
 @pytest.fixture(scope="session")
 def whole(tmp_path_factory) -> Project:
-    """A campaign that nothing disturbed."""
-    project = Project(tmp_path_factory.mktemp("whole"))
-    project.run(*SMOKE, "--", *TARGET)
+    """A campaign that nothing disturbed, the same one for all processes of the tests."""
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "whole"
+    folder.mkdir(exist_ok=True)
+    ended, lock = folder / "ended", folder / "lock"
+    lock.touch()
+    with one_at_a_time(lock):
+        project = Project(folder)
+        if not ended.exists():
+            project.run(*SMOKE, "--", *TARGET)
+            ended.touch()
     return project
 
 
@@ -155,6 +177,11 @@ def begin(project: Project, *arguments: str, **streams) -> subprocess.Popen:
         start_new_session=True,
         **{"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL} | streams,
     )
+
+
+def locked(project: Project) -> bool:
+    """Whether a run of Snakemake has begun that has not ended."""
+    return any((project.folder / ".snakemake/locks").glob("*"))
 
 
 def end(process: subprocess.Popen, number: signal.Signals) -> None:

@@ -132,7 +132,7 @@ def test_no_file_of_a_campaign_is_damaged_unseen(whole, tmp_path, ledger, monkey
             else:
                 outcomes.append("harmless" if damaged == content else "silent")
         path.write_bytes(content)
-    count(ledger, f"damage in all {len(files)} files of a campaign, by the checksums", outcomes)
+    count(ledger, "damage in the files of a campaign, by the checksums", outcomes)
 
 
 STAGES = {

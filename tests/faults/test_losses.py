@@ -15,9 +15,9 @@ from tests.faults.conftest import (
     copy_of,
     count,
     difference,
+    locked,
     results,
 )
-from tests.faults.test_campaign import locked
 from tests.workflow.conftest import Project
 
 pytestmark = pytest.mark.faults

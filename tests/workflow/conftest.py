@@ -13,18 +13,27 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 class Project:
-    """A copy of the workflow and the library, with Snakemake to run on it."""
+    """A copy of the workflow and the library, with Snakemake to run on it.
+
+    A copy that is in the folder already is taken as it is.
+    """
 
     def __init__(self, folder: Path):
         self.folder = folder
+        if not (folder / "Snakefile").exists():
+            self._copy()
+        self.rules: set[str] = set()
+
+    def _copy(self) -> None:
         for name in ("config", "docs", "profiles", "workflow"):
-            shutil.copytree(ROOT / name, folder / name)
+            shutil.copytree(ROOT / name, self.folder / name)
         shutil.copytree(
-            ROOT / "dustfall", folder / "dustfall", ignore=shutil.ignore_patterns("__pycache__")
+            ROOT / "dustfall",
+            self.folder / "dustfall",
+            ignore=shutil.ignore_patterns("__pycache__"),
         )
         self._share_kernels()
-        shutil.copy2(ROOT / "Snakefile", folder)
-        self.rules: set[str] = set()
+        shutil.copy2(ROOT / "Snakefile", self.folder)
 
     def _share_kernels(self) -> None:
         """Compile what numba compiles once, here or there: what a test edits is compiled anew."""
