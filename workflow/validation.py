@@ -507,25 +507,32 @@ def neighbours(figure: pd.DataFrame) -> pd.DataFrame:
     return table[["volume_fraction", "neighbours", "drag", "half"]]
 
 
-def fluctuations(spectra: pd.DataFrame, ergodicity: pd.DataFrame) -> pd.DataFrame:
-    """Slopes of the spectra and spread of time averages of the largest clouds: one row a phi."""
-    slopes = spectra.drop_duplicates(["method", "volume_fraction"])
+def fluctuations(
+    spectra: pd.DataFrame, tracked: pd.DataFrame, ergodicity: pd.DataFrame
+) -> pd.DataFrame:
+    """Slopes of the spectra and spread of time averages of the largest clouds: one row a phi.
+
+    slope_<method> and half_<method> are those of all particles over the window in which the cloud
+    is steady; steepest and flattest those of the tracked particles over the paper's.
+    """
+    slopes = spectra[spectra["panel"] == "fit"].drop_duplicates(["method", "volume_fraction"])
     half = (slopes["slope_high"] - slopes["slope_low"]) / 2
     columns = ["volume_fraction", "method", "slope", "half"]
     slopes = wide(slopes.assign(half=half)[columns], "volume_fraction", "method")
+    early = tracked[tracked["panel"] == "fit"].groupby("volume_fraction", as_index=False)
+    early = early.agg(steepest=("slope", "min"), flattest=("slope", "max"))
     longest = ergodicity.sort_values("window").drop_duplicates("volume_fraction", keep="last")
     longest = longest[["volume_fraction", "n", "window", "spread"]]
-    return slopes.merge(longest, on="volume_fraction")
+    return slopes.merge(early, how="left").merge(longest, on="volume_fraction")
 
 
-def voronoi(figure: pd.DataFrame) -> pd.DataFrame:
+def voronoi(figure: pd.DataFrame, configuration: dict) -> pd.DataFrame:
     """Variance of the Voronoi cells of the largest clouds: one row a phi, the paper's beside it.
 
     All over k theta^2 = 0.2, as the paper gives it.
     """
-    own = figure[figure["source"] == "simulation"].sort_values(["galileo", "n"])
-    lowest = own.groupby(["volume_fraction", "n"], as_index=False).first()
-    largest = lowest.groupby("volume_fraction", as_index=False).last()
+    own = figure[(figure["source"] == "simulation") & (figure["n"] == _largest(configuration))]
+    largest = own.sort_values("galileo").groupby("volume_fraction", as_index=False).first()
     table = largest[["volume_fraction", "n", "status", "variance"]]
     table = table.assign(half=(largest["high"] - largest["low"]) / 2)
     random = figure[figure["source"] == "random spheres"]
@@ -541,7 +548,8 @@ def changes(table: pd.DataFrame, configuration: dict) -> pd.DataFrame:
     """How often neighbours change in the largest clouds: one row a phi."""
     own = _cases(table, configuration["sedimentation"]["model"])
     own = own.assign(half=(own["high"] - own["low"]) / 2)
-    return own[own["n"] == own["n"].max()].sort_values("volume_fraction", ignore_index=True)
+    own = own[own["n"] == _largest(configuration)]
+    return own.sort_values("volume_fraction", ignore_index=True)
 
 
 def run_times(folder: Path) -> pd.DataFrame:
@@ -565,6 +573,12 @@ def run_times(folder: Path) -> pd.DataFrame:
         )
     )
     return table.sort_values("core_seconds", ascending=False, ignore_index=True)
+
+
+def _largest(configuration: dict) -> int:
+    """Number of particles of the largest clouds that settle at every volume fraction."""
+    settle = configuration["sedimentation"]
+    return max(settle["long"]["particles"] or settle["particles"])
 
 
 def _cases(table: pd.DataFrame, model: str) -> pd.DataFrame:
@@ -658,9 +672,13 @@ TABLES: dict[str, tuple[Callable[..., pd.DataFrame], tuple[str, ...]]] = {
     "changes": (changes, ("results/analysis/neighbour_changes.csv", CONFIGURATION)),
     "fluctuations": (
         fluctuations,
-        ("results/figures/cloud_spectra.csv", "results/figures/ergodicity.csv"),
+        (
+            "results/figures/cloud_spectra.csv",
+            "results/figures/phase_and_spectra.csv",
+            "results/figures/ergodicity.csv",
+        ),
     ),
-    "voronoi": (voronoi, ("results/figures/voronoi_variance.csv",)),
+    "voronoi": (voronoi, ("results/figures/voronoi_variance.csv", CONFIGURATION)),
     "run_times": (run_times, ("benchmarks",)),
 }
 """Each table of the page of validation: the function that reduces its sources to it, and these."""

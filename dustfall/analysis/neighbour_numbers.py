@@ -8,7 +8,7 @@ import xarray as xr
 
 from dustfall.analysis.references import PAPER_SETTLING, PAPER_WINDOW
 from dustfall.analysis.settling import case_of, from_time, steadiness, with_starts
-from dustfall.analysis.time_averages import mean_with_interval
+from dustfall.analysis.time_averages import FEWEST_VALUES, Mean, mean_with_interval
 
 
 def neighbour_numbers_table(
@@ -24,8 +24,9 @@ def neighbour_numbers_table(
     Returns
     -------
     columns neighbours, volume_fraction, n, status (`settling.steadiness`), value and half (of the
-    95 % interval by batch means) [v_s], as_paper (mean over the paper's window, NaN for a run that
-    ends before it does), paper and relation (NaN and empty where it has none); sorted
+    95 % interval by batch means) [v_s], as_paper and as_paper_half (the same over the paper's
+    window, NaN for a run that ends before it does or has too few steps in it), paper and relation
+    (NaN and empty where it has none); sorted
 
     Raises
     ------
@@ -37,6 +38,7 @@ def neighbour_numbers_table(
     for run, start in with_starts(runs, starts):
         case, window = case_of(run), from_time(run, start, "step")
         mean = mean_with_interval(window["settling_velocity_mean"].values)
+        early = _mean_as_paper(run)
         point = points.get(f"{case['volume_fraction']:.6e}")
         rows.append(
             {
@@ -46,7 +48,8 @@ def neighbour_numbers_table(
                 "status": steadiness([window])[0],
                 "value": mean.value,
                 "half": mean.half_width,
-                "as_paper": _mean_as_paper(run),
+                "as_paper": early.value if early else np.nan,
+                "as_paper_half": early.half_width if early else np.nan,
                 "paper": point.value if point else None,
                 "relation": point.relation if point else "",
             }
@@ -55,10 +58,11 @@ def neighbour_numbers_table(
     return table.astype({"paper": float})
 
 
-def _mean_as_paper(run):
-    """Mean settling velocity over `PAPER_WINDOW`; NaN where the run ends before."""
-    time, velocity = run["time"].values, run["settling_velocity_mean"].values
+def _mean_as_paper(run: xr.Dataset) -> Mean | None:
+    """Mean settling velocity over `PAPER_WINDOW`; none of a run that ends or hardly steps in it."""
     first, last = PAPER_WINDOW
-    if time[-1] < last:
-        return np.nan
-    return float(velocity[(time >= first) & (time <= last)].mean())
+    time = run["time"].values
+    inside = (time >= first) & (time <= last)
+    if time[-1] < last or inside.sum() < FEWEST_VALUES:
+        return None
+    return mean_with_interval(run["settling_velocity_mean"].values[inside])

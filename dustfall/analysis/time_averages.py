@@ -7,6 +7,9 @@ import scipy
 
 FEWEST_BATCHES = 5
 MOST_BATCHES = 30
+FEWEST_VALUES = 2 * FEWEST_BATCHES
+"""A shorter series has no interval."""
+
 BATCH_LENGTH = 4
 """Length of a batch in correlation lengths: with it and at least five batches, 95 % intervals of
 autoregressive series of 10 to 1,000 correlation times hold the true mean in 92 to 96 % of cases."""
@@ -146,9 +149,9 @@ def drift_of_runs(drifts: list[Drift]) -> Drift:
 
 def _checked(values) -> np.ndarray:
     x = np.asarray(values, dtype=float)
-    if x.ndim != 1 or x.size < 2 * FEWEST_BATCHES:
+    if x.ndim != 1 or x.size < FEWEST_VALUES:
         raise ValueError(
-            f"a series of shape {x.shape} has no interval; at least {2 * FEWEST_BATCHES} values"
+            f"a series of shape {x.shape} has no interval; at least {FEWEST_VALUES} values"
         )
     if not np.isfinite(x).all():
         raise ValueError(f"value {int(np.flatnonzero(~np.isfinite(x))[0])} is not finite")

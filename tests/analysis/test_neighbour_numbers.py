@@ -49,7 +49,18 @@ def test_the_papers_window_is_averaged_beside_and_a_run_that_ends_before_has_non
     )
     table = neighbour_numbers_table([long, run(5, 1e-3, 1.49)], 0.0).set_index("neighbours")
     assert table.loc[4, "as_paper"] == pytest.approx(1.2)
-    assert np.isnan(table.loc[5, "as_paper"])
+    assert table.loc[4, "as_paper_half"] == 0
+    assert np.isnan(table.loc[5, ["as_paper", "as_paper_half"]].astype(float)).all()
+
+
+def test_a_run_that_hardly_steps_in_the_papers_window_has_no_mean_over_it():
+    whole = run(4, 1e-3, 1.4)
+    stretched = whole.assign(time=whole["time"] * (1000 / float(whole["time"][-1])))
+    inside = (stretched["time"] >= 50) & (stretched["time"] <= 100)
+    assert 10 < inside.sum() < 100
+    tenth = stretched.isel(step=slice(None, None, 10))
+    table = neighbour_numbers_table([stretched, tenth.assign_attrs(neighbours=5)], 300.0)
+    assert table["as_paper"].isna().tolist() == [False, True]
 
 
 def test_each_run_may_have_a_start_of_its_own():
