@@ -23,11 +23,14 @@ configfile: ROOT / "config" / "config.yaml"
 
 try:
     go_on = config.pop(GO_ON, False)
-    for file in workflow.configfiles:
+    # Of a workflow that has this one as a module the files are its own.
+    for file in workflow.configfiles if workflow.modifier.is_main_snakefile() else ():
         read_file(file)
     config = configure(config)
     bound = cost(config)
-    check_plan(bound, go_on)
+    # A job on a cluster is a part of what was checked, and its node another machine.
+    if workflow.is_main_process:
+        check_plan(bound, go_on)
 except (ConfigurationError, CostError) as error:
     sys.exit(f"Configuration: {error}")
 
@@ -157,6 +160,7 @@ rule verify:
 
 onstart:
     stops.require_writable()
+    stops.be_alone()
     stops.clear()
     print(f"The whole campaign takes about {bound}; what is there already is not made again.")
     if workflow.local_exec:

@@ -9,11 +9,13 @@ import os
 import shutil
 from dataclasses import dataclass
 from math import ceil
+from pathlib import Path
 
 from dustfall.forces.features import KINDS
 from dustfall.forces.learned import multiplications
 from dustfall.own_data import shape
 from workflow import plan
+from workflow.checksums import RESULTS
 
 JOB_SECONDS = 3.6
 """Start and imports of a job."""
@@ -123,8 +125,12 @@ def cost(config: dict) -> Cost:
 def check_plan(bound: Cost, go_on: bool) -> None:
     """Raise CostError where the plan or the files of a campaign do not fit this machine."""
     _require("memory to plan its jobs", bound.planning, _memory(), go_on)
-    free = shutil.disk_usage(os.getcwd()).free
-    _require("disk", bound.disk, free, go_on)
+    place = RESULTS if RESULTS.is_dir() else Path()
+    room = shutil.disk_usage(place).free
+    if bound.disk > room:
+        # What is there already takes no more room.
+        room += sum(path.stat().st_size for path in place.rglob("*") if path.is_file())
+    _require("disk", bound.disk, room, go_on)
 
 
 def check_jobs(bound: Cost, cores: int, device: str, go_on: bool) -> None:

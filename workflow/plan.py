@@ -1,8 +1,12 @@
 """Which artefacts a configuration asks for, and how they are named."""
 
+import json
+from collections.abc import Mapping
 from decimal import Decimal
+from functools import cache
 from itertools import chain, repeat
 from math import ceil
+from types import MappingProxyType
 from typing import NamedTuple
 from zlib import crc32
 
@@ -175,7 +179,10 @@ def training(config: dict, model: str) -> dict:
 
 def compared_models(config: dict) -> list[str]:
     """Force models that clouds settle with beside the campaign's; "formulas" is all of them."""
-    settle = config["sedimentation"]
+    return _compared_models(config["sedimentation"])
+
+
+def _compared_models(settle: dict) -> list[str]:
     formulas = [name for name in settling_models() if name not in trained_models()]
     named = [
         name
@@ -185,9 +192,15 @@ def compared_models(config: dict) -> list[str]:
     return [name for name in dict.fromkeys(named) if name != settle["model"]]
 
 
-def cases(config: dict) -> dict[str, Case]:
+def cases(config: dict) -> Mapping[str, Case]:
     """Every sedimentation case by its name; of the first seed all, then of the next one."""
-    settle = config["sedimentation"]
+    # The plan asks once and again for each of them.
+    return _cases(json.dumps(config["sedimentation"]))
+
+
+@cache
+def _cases(settings: str) -> Mapping[str, Case]:
+    settle = json.loads(settings)
     galileo = settle["galileo"]
     long = settle["long"]
     phis = settle["volume_fractions"]
@@ -202,7 +215,7 @@ def cases(config: dict) -> dict[str, Case]:
         *(Case(n, phi, 1.0, long=True) for n in long["particles"] for phi in phis),
         *(
             Case(fewest, phi, 1.0, compared=compared, long=lasting)
-            for compared in [*compared_models(config), *[BACK_FLOW] * settle["back_flow"]]
+            for compared in [*_compared_models(settle), *[BACK_FLOW] * settle["back_flow"]]
             for phi in phis
         ),
         *(
@@ -213,13 +226,14 @@ def cases(config: dict) -> dict[str, Case]:
     ]
     seeds = _seeds(settle["particles"], settle["seeds"])
     long_seeds = _seeds(long["particles"], long["seeds"])
-    return {
+    by_name = {
         case.name: case
         for seed in range(1, max([*settle["seeds"], *long["seeds"]]) + 1)
         for case in (one._replace(seed=seed) for one in found)
         # Compared long cases have the first start only: they differ from each other by their paths.
         if seed <= (seeds, {} if case.compared else long_seeds)[case.long].get(case.particles, 1)
     }
+    return MappingProxyType(by_name)
 
 
 def _seeds(particles: list[int], numbers: list[int]) -> dict[int, int]:

@@ -5,6 +5,7 @@ A job that stops leaves its sentence in `logs/stopped`; Snakemake's process says
 
 import atexit
 import errno
+import fcntl
 import os
 import re
 import shlex
@@ -20,6 +21,7 @@ from workflow.checksums import RESULTS
 
 NOTE = Path("logs/stopped")
 SCRIPTS = Path(".snakemake/scripts")
+OWN_RUN = Path(".snakemake/dustfall.lock")
 
 CAUSES = {
     errno.ENOSPC: "the disk is full",
@@ -51,6 +53,23 @@ def note(words: str) -> None:
         NOTE.parent.mkdir(exist_ok=True)
         with open(NOTE, "a", encoding="utf-8") as file:
             file.write(f"{words}\n")
+
+
+def be_alone() -> None:
+    """Exit with a sentence where another run is at work in this folder; keep others out from now.
+
+    Snakemake's own lock knows files, and lets runs through that share none, `verify` among them:
+    it would complain of files that are being written, and `clear` takes scripts that still run.
+    """
+    OWN_RUN.parent.mkdir(exist_ok=True)
+    # Held until this process ends, however it ends.
+    file = os.open(OWN_RUN, os.O_RDWR | os.O_CREAT)
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        sys.exit(_last_words("another run is at work in this folder, and goes on"))
+    except OSError:
+        pass  # a file system without locks
 
 
 def clear() -> None:

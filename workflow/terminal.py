@@ -179,8 +179,9 @@ class Terminal(logging.Handler):
         ended = self.run.done == self.run.total
         if self.stopped.is_set() or not (self.live or due or ended):
             return
-        line = self._line(time.monotonic())
+        # Under the lock that records come in by: what the line tells of does not change meanwhile.
         with self.lock:  # type: ignore[union-attr]
+            line = self._line(time.monotonic())
             if line == self.written:
                 return
             self.written = line

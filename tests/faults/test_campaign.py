@@ -6,6 +6,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -21,9 +22,12 @@ INTERRUPTIONS = max(2, KILLS // 10)
 WHILE_PLANNING = 0.25
 """Share of the kills that meet Snakemake before it has planned; an interrupt then stops nothing."""
 
-MEAN = 0.8
-"""Time from the plan to the signal, in starts of Snakemake, on average of an exponential law: short
-for many stops in every stage, yet now and then long enough for the longest job."""
+FILES = 2.0
+"""Files that a campaign makes between its plan and the signal, on average of Poisson's law: some
+stops meet the jobs that it went on with, and a hundred of them go through to its end."""
+
+MOMENT = 2.0
+"""The signal comes at most so long after that [s]."""
 
 
 def unlock(project: Project) -> None:
@@ -57,6 +61,21 @@ def start_up(project: Project) -> float:
     return time.monotonic() - began
 
 
+def files_of(project: Project) -> int:
+    """Number of files that the campaign has made."""
+    return sum(1 for _ in (project.folder / "results/checksums").rglob("*.sha256"))
+
+
+def has_made(project: Project, number: int) -> bool:
+    return files_of(project) >= number
+
+
+def wait_for(condition: Callable[[], bool], process: subprocess.Popen) -> None:
+    """Wait until something holds, or the process has ended."""
+    while process.poll() is None and not condition():
+        time.sleep(0.1)
+
+
 def stopped_run(
     project: Project, number: int, start: float, rng, at_its_end: Callable[[], None]
 ) -> str:
@@ -66,13 +85,13 @@ def stopped_run(
             project, "--", *TARGET, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
         )
         if number == signal.SIGKILL and rng.random() < WHILE_PLANNING:
-            moment = rng.uniform()
+            moment = rng.uniform(0, start)
         else:
-            moment = rng.exponential(MEAN)
-            while process.poll() is None and not locked(project):
-                time.sleep(0.1)
+            wait_for(partial(locked, project), process)
+            wait_for(partial(has_made, project, files_of(project) + rng.poisson(FILES)), process)
+            moment = rng.uniform(0, MOMENT)
         try:
-            words, _ = process.communicate(timeout=start * moment)
+            words, _ = process.communicate(timeout=moment)
         except subprocess.TimeoutExpired:
             end(process, number)
             words, _ = process.communicate()

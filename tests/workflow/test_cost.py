@@ -1,5 +1,6 @@
 """What a campaign is foretold to take is what a measured one took, and grows with its settings."""
 
+import shutil
 from pathlib import Path
 
 import pandas as pd
@@ -7,7 +8,7 @@ import pytest
 import yaml
 
 from workflow.configuration import configure
-from workflow.cost import CostError, check_jobs, check_plan, cost
+from workflow.cost import Cost, CostError, check_jobs, check_plan, cost
 
 DOCS = Path(__file__).resolve().parents[2] / "docs/validation"
 
@@ -38,6 +39,18 @@ def test_cost_grows_with_what_is_asked_for():
     longer = of(sedimentation={"duration": 1000})
     assert 5 < longer.disk / usual.disk < 10
     assert usual.seconds < longer.seconds < 10 * usual.seconds
+
+
+def test_a_campaign_that_is_half_done_needs_half_the_room(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "results/sedimentation").mkdir(parents=True)
+    disk = shutil.disk_usage(tmp_path)
+    bound = Cost(1, 1.0, disk=disk.total + 1e9, planning=1e6, memory=1e6)
+    with pytest.raises(CostError, match="GB of disk"):
+        check_plan(bound, go_on=False)
+    with open(tmp_path / "results/sedimentation/large.nc", "wb") as file:
+        file.truncate(disk.total + 2 * 10**9)  # takes no room: a hole
+    check_plan(bound, go_on=False)
 
 
 @pytest.mark.parametrize(

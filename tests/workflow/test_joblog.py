@@ -18,18 +18,19 @@ import sys
 sys.path[:0] = {[str(SCRIPTS), str(SCRIPTS.parents[1])]!r}
 import joblog
 from types import SimpleNamespace
-job = SimpleNamespace(rule="some_rule", log=["job.log"], input=sys.argv[1:2], output=sys.argv[2:3])
+log = sys.argv.pop(1)
+job = SimpleNamespace(rule="some_rule", log=[log], input=sys.argv[1:2], output=sys.argv[2:3])
 progress = joblog.start(job)
 """
 
 
-def run(folder, code: str, reads="", writes="", **streams) -> tuple[int, str]:
+def run(folder, code: str, reads="", writes="", log="job.log", **streams) -> tuple[int, str]:
     """Exit status and log of a job with this body, which reads and writes a file at most."""
     files = [reads, writes] if writes else [reads] if reads else []
     done = subprocess.run(
-        [sys.executable, "-c", HEAD + code, *files], check=False, cwd=folder, **streams
+        [sys.executable, "-c", HEAD + code, log, *files], check=False, cwd=folder, **streams
     )
-    return done.returncode, (folder / "job.log").read_text()
+    return done.returncode, (folder / log).read_text()
 
 
 def write(path: str) -> str:
@@ -142,3 +143,18 @@ def test_every_file_of_a_campaign_is_verified(tmp_path, monkeypatch):
     assert "is damaged" in words["table.csv"]
     assert "no checksum" in words["stray.csv"]
     assert "is lost" in words["lost.csv"]
+
+
+def test_below_the_prefix_of_a_module_it_is_the_same(tmp_path, monkeypatch):
+    for folder in ("dust/results", "dust/logs/figures", "elsewhere/results"):
+        (tmp_path / folder).mkdir(parents=True)
+    table, log = f"dust/{TABLE}", "dust/logs/figures/some_rule.log"
+    (tmp_path / table).parent.mkdir()
+    (tmp_path / "elsewhere/results/own.csv").write_text("mine")
+    assert run(tmp_path, write(table), "elsewhere/results/own.csv", table, log)[0] == 0
+    monkeypatch.chdir(tmp_path)
+    assert dict(checksums.verify(checksums.results_of(log))) == {Path(table): ""}
+    (tmp_path / table).write_text("contenu")
+    status, words = run(tmp_path, write(f"dust/{PICTURE}"), table, f"dust/{PICTURE}", log)
+    assert status == 1
+    assert f"DamageError: {table} is damaged" in words

@@ -34,9 +34,15 @@ def user(tmp_path) -> Project:
 
 
 def test_its_rules_run_with_the_configuration_that_is_handed_in(user):
-    (user.folder / "mine.yaml").write_text("dustfall: {seed: 7}")
+    # What YAML can do elsewhere in that file is not for this project to allow.
+    (user.folder / "mine.yaml").write_text("mine: &it {a: 1}\nalso: *it\ndustfall: {seed: 7}")
     user.run("--cores", "1")
     assert yaml.safe_load((user.folder / "mine.txt").read_text())["seed"] == 7
+    made = user.folder / "dust/results/config.yaml"
+    assert (made.parent / "checksums/config.yaml.sha256").exists()
+    user.run("--cores", "1", "--", "dustfall_verify")
+    made.write_text("seed: 8")
+    assert "dust/results/config.yaml is damaged" in user.snakemake("-c1", "--", "dustfall_verify").stdout
 
 
 def test_all_of_it_is_planned_below_the_prefix(user):

@@ -280,3 +280,14 @@ def test_a_formula_added_as_one_file_is_allowed_and_its_cases_are_planned(projec
     assert f"n1000_phi1e-03_ga1_{name}_long.nc" not in words  # it is the campaign's own model
     words = project.dry_run("--", "all")
     assert f"results/sedimentation/n1000_phi1e-03_ga1_{name}_long.nc" in words
+
+
+def test_cases_are_those_of_the_configuration_as_it_stands():
+    config = configure({"sedimentation": {"seeds": [1], "long": {"seeds": [1]}}})
+    few = plan.cases(config)
+    config["sedimentation"]["seeds"] = [100]
+    config["sedimentation"]["long"]["seeds"] = [100]
+    many = plan.cases(config)
+    assert len(many) > 10 * len(few)
+    assert few.items() <= many.items()
+    assert all(plan.schedule(config, name)["step"] > 0 for name in many)

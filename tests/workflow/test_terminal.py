@@ -1,6 +1,7 @@
 """What a terminal shows of a run: a line with the time to go, and last the reason of a failure."""
 
 import errno
+import fcntl
 import os
 import pty
 import re
@@ -51,6 +52,23 @@ def test_a_run_leaves_a_line_of_its_jobs_and_a_failure_its_reason_last(project):
     assert lines[-1].startswith("Stopped: own_data: own.csv: force of scene 0")
     assert "\x1b" not in lines[-1]
     assert len(lines) < 20
+
+
+def test_beside_a_run_no_other_begins_not_even_one_of_other_files(project):
+    (project.folder / ".snakemake").mkdir()
+    with open(project.folder / ".snakemake/dustfall.lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        (project.folder / ".snakemake/scripts").mkdir()
+        (project.folder / ".snakemake/scripts/tmp1.settle.py").touch()
+        done = project.snakemake("--", "verify")
+        assert done.returncode == 1
+        last = (done.stdout + done.stderr).rstrip().splitlines()[-1]
+        assert last.startswith("Stopped: another run is at work in this folder")
+        assert last.endswith("To go on: snakemake -- verify")
+        # What the other run is at work with is as it was.
+        assert (project.folder / ".snakemake/scripts/tmp1.settle.py").exists()
+        project.dry_run("--", "results/config.yaml")
+    project.run("--", "verify")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

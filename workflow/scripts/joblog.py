@@ -41,7 +41,7 @@ def start(job) -> Callable[..., Callable[[int, int], None]]:
     _end_with_a_sentence(job)
     for path in job.output:
         remove_leftovers(path)
-    checksums.check(job.input)
+    checksums.check(job.input, checksums.results_of(job.log[0]))
 
     return lambda label, unit="items": Progress(label, unit).report
 
@@ -53,7 +53,7 @@ def _end_with_a_sentence(job) -> None:
         if not all(map(os.path.exists, job.output)):
             return
         try:
-            checksums.seal(job.output)
+            checksums.seal(job.output, checksums.results_of(job.log[0]))
         except OSError as error:
             # Python would go on from here to a good end.
             stops.note(f"{job.rule}: {stops.sentence(error)}")

@@ -5,13 +5,14 @@ from pathlib import Path
 
 from workflow import checksums, stops
 
-found = list(checksums.verify())
+log = Path(snakemake.log[0])
+results = checksums.results_of(log)
+found = list(checksums.verify(results))
 complaints = [complaint for _, complaint in found if complaint]
 words = [
     *complaints,
-    f"{len(found)} files in {checksums.RESULTS}/, {len(found) - len(complaints)} of them whole",
+    f"{len(found)} files in {results}/, {len(found) - len(complaints)} of them whole",
 ]
-log = Path(snakemake.log[0])
 log.parent.mkdir(parents=True, exist_ok=True)
 log.write_text("\n".join(words) + "\n", encoding="utf-8")
 print(*words, sep="\n")
