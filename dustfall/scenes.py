@@ -8,8 +8,8 @@ from dustfall.units import NEIGHBOURS, SPHERE_VOLUME
 
 LAWS = ("uniform", "ball", "contact")
 """Radial laws: `uniform`, radii uniform between contact and the farthest neighbour (the law that
-reproduces the paper's statistics); `ball`, points uniform in the ball (a dilute random suspension);
-`contact`, as `uniform`, but one neighbour nearly touches the reference sphere."""
+comes nearest to the paper's statistics); `ball`, points uniform in the ball (a dilute random
+suspension); `contact`, as `uniform`, but one neighbour nearly touches the reference sphere."""
 
 NEAR_CONTACT = (1e-3, 0.1)
 """Gap [d_p] of the nearly touching neighbour of the law `contact`, uniform in this range: scenes
