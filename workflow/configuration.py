@@ -286,6 +286,7 @@ def _check_physics(config: dict) -> None:
         _check_own_data(config)
     else:
         _check_scenes(config)
+    _check_neighbours(config)
     low, high = figures["fit_frequencies"]
     _require(
         low < high,
@@ -435,12 +436,6 @@ def _check_scenes(config: dict) -> None:
         f"scenes.phi_max is {scenes['phi_max']:g}, but must be at most {densest(neighbours):.3g} "
         f"with {neighbours} of scenes.neighbours: random draws without overlap stall above.",
     )
-    smallest = min(config["sedimentation"]["particles"])
-    _require(
-        neighbours < smallest,
-        f"scenes.neighbours is {neighbours}, but must be below the smallest of "
-        f"sedimentation.particles, which is {smallest}.",
-    )
     laws = config["idnn"]["laws"]
     drawn = sum(scenes["number"][law] for law in laws)
     fewest = 10 * config["idnn"]["folds"]
@@ -490,12 +485,25 @@ def _check_own_data(config: dict) -> None:
         f"dataset.file is {file}, which has {neighbours} neighbours a scene, but must have "
         f"{fewest} to {most}.",
     )
-    smallest = min(config["sedimentation"]["particles"])
-    _require(
-        neighbours < smallest,
-        f"dataset.file is {file}, which has {neighbours} neighbours a scene, but must have fewer "
-        f"than the smallest of sedimentation.particles, which is {smallest}.",
-    )
+
+
+def _check_neighbours(config: dict) -> None:
+    """Refuse clouds with fewer particles than a particle feels of them."""
+    settle, file = config["sedimentation"], config["dataset"]["file"]
+    number = plan.neighbours(config)
+    of = f"the neighbours in {file}, which are" if file else "scenes.neighbours, which is"
+    for key, particles in {
+        "sedimentation.particles": settle["particles"],
+        "sedimentation.galileo.particles": [settle["galileo"]["particles"]],
+        "sedimentation.long.particles": settle["long"]["particles"],
+        "studies.particles": [config["studies"]["particles"]],
+    }.items():
+        for fewest in sorted(particles)[:1]:
+            _require(
+                fewest > number,
+                f"{key} {'goes down to' if len(particles) > 1 else 'is'} {fewest}, but must stay "
+                f"above {of} {number}.",
+            )
 
 
 def _require_multiple(key: str, value: float, of: str, step: float, unit: str = "response") -> None:

@@ -199,10 +199,42 @@ REFUSED = [
 ]
 
 
-def test_a_cloud_has_more_particles_than_neighbours():
-    settings = {"scenes": {"neighbours": 20}, "sedimentation": {"particles": [15, 1000]}}
-    with pytest.raises(ConfigurationError, match=r"neighbours is 20, but must be below .* is 15\."):
+def own_data(folder: Path, scenes: int, neighbours: int = 5) -> dict:
+    """Settings of a data set of one's own, and its file as far as the configuration looks at it."""
+    names = [f"{axis}{j}" for j in range(1, neighbours + 1) for axis in "xyz"]
+    names += ["force_x", "force_y", "force_z"]
+    rows = [",".join(names), *[",".join("0" for _ in names)] * scenes]
+    (folder / "own.csv").write_text("\n".join(rows))
+    return {"dataset": {"file": str(folder / "own.csv")}}
+
+
+CLOUDS = [
+    ("sedimentation.particles", [1000, 15], "goes down to 15"),
+    ("sedimentation.galileo.particles", 20, "is 20"),
+    ("sedimentation.long.particles", [15], "is 15"),
+    ("studies.particles", 15, "is 15"),
+]
+"""Clouds of nearest neighbours, too small for twenty."""
+
+
+@pytest.mark.parametrize(("key", "value", "shown"), CLOUDS)
+def test_a_cloud_has_more_particles_than_neighbours(tmp_path, key, value, shown):
+    for settings, of in (
+        ({"scenes": {"neighbours": 20}}, "scenes.neighbours, which is 20."),
+        (own_data(tmp_path, 1000, neighbours=20), "own.csv, which are 20."),
+    ):
         configure(settings)
+        with pytest.raises(ConfigurationError) as refusal:
+            configure(settings | nested(key, value))
+        words = str(refusal.value)
+        assert words.startswith(f"{key} {shown}, but must stay above ")
+        assert words.endswith(of)
+
+
+def test_a_cloud_in_which_all_feel_each_other_may_have_few_particles():
+    configure(
+        {"scenes": {"neighbours": 20}} | nested("sedimentation.all_particles.particles", [15])
+    )
 
 
 def test_scenes_have_as_many_neighbours_as_find_room():
