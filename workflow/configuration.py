@@ -9,11 +9,13 @@ import math
 import re
 import sys
 from collections.abc import Iterable
+from itertools import count
 from pathlib import Path
 
 import jsonschema
 import yaml
 
+from dustfall.dataset import OWN_LAW
 from dustfall.forces.features import FEWEST
 from dustfall.forces.frames import MOST_NEIGHBOURS
 from dustfall.forces.registry import settling_models, trained_models
@@ -57,6 +59,11 @@ below the highest frequency that is fitted, and a slope needs three."""
 FITTED_VALUES, HIGHEST_FITTED, SHORTEST_SEGMENT, BINS_PER_DECADE = 3, 0.25, 24, 20
 """What `analysis.spectra` needs for a slope and calls by these names; a test holds both together,
 because importing it costs every start of Snakemake a second."""
+
+RANKED_SCENES, TESTED_SCENES, TRAINED_SCENES = 3, 2, 10
+"""Fewest scenes of a law for a rank correlation, of that of the figures for a variance of the test,
+and of a model for its training; tests hold them to what fails with fewer, because importing PyTorch
+costs every start of Snakemake seconds."""
 
 
 class ConfigurationError(ValueError):
@@ -444,13 +451,6 @@ def _check_scenes(config: dict) -> None:
         f"scenes.number is {drawn} in all of {', '.join(laws)}, but must be at least {fewest}, "
         f"ten scenes for each of the {config['idnn']['folds']} folds of idnn.folds.",
     )
-    share = config["dataset"]["test_share"]
-    for law, number in scenes["number"].items():
-        _require(
-            number == 0 or round(share * number) > 0,
-            f"scenes.number.{law} is {number}, but must be 0 or at least "
-            f"{math.ceil(0.51 / share)}, so that dataset.test_share, {share:g}, leaves a scene.",
-        )
     law = config["figures"]["radial_law"]
     _require(
         scenes["number"][law] > 0,
@@ -465,6 +465,20 @@ def _check_scenes(config: dict) -> None:
                 scenes["number"][law] > 0,
                 f"{key} names {law}, but must name laws that scenes.number draws scenes of.",
             )
+    for law, number in scenes["number"].items():
+        _check_share(config, f"scenes.number.{law} is {number}", law, number)
+    share = config["dataset"]["test_share"]
+    # Of the trials none has fewer: they are of these models, or of the laws of the IDNN.
+    for model in trained_models():
+        left = plan.training_scenes(config, model)
+        key = f"idnn.laws_of.{model}"
+        _require(
+            left >= TRAINED_SCENES,
+            f"{key if key in trained_on else 'idnn.laws'} is "
+            f"{', '.join(plan.laws(config, model))}, of which scenes.number and "
+            f"dataset.test_share, {share:g}, leave {left} scenes to train on, but must be laws "
+            f"that leave at least {TRAINED_SCENES}.",
+        )
 
 
 def _check_own_data(config: dict) -> None:
@@ -479,11 +493,26 @@ def _check_own_data(config: dict) -> None:
         f"dataset.file is {file}, which has {number} scenes, but must have at least {10 * folds}, "
         f"ten for each of the {folds} folds of idnn.folds.",
     )
+    # They leave five scenes a fold for training.
+    _check_share(config, f"dataset.file is {file}, which has {number} scenes", OWN_LAW, number)
     fewest, most = FEWEST["decomposed"], MOST_NEIGHBOURS
     _require(
         fewest <= neighbours <= most,
         f"dataset.file is {file}, which has {neighbours} neighbours a scene, but must have "
         f"{fewest} to {most}.",
+    )
+
+
+def _check_share(config: dict, shown: str, law: str, number: int) -> None:
+    """Refuse a law with too few scenes to say anything, or with too few of them for the test."""
+    share, of_figures = config["dataset"]["test_share"], law == plan.figure_law(config)
+    tested = TESTED_SCENES if of_figures else 1
+    fewest = next(n for n in count(RANKED_SCENES) if round(share * n) >= tested)
+    _require(
+        number >= fewest or (number == 0 and not of_figures),
+        f"{shown}, but must {'have' if law == OWN_LAW else 'be' if of_figures else 'be 0 or'} at "
+        f"least {fewest}, so that ranks of {RANKED_SCENES} can be correlated and "
+        f"dataset.test_share, {share:g}, leaves {tested} for the test.",
     )
 
 

@@ -7,8 +7,10 @@ import pytest
 import yaml
 
 from dustfall.analysis import spectra
+from dustfall.analysis.correlations import coefficient_of_determination, spearman_by_neighbours
 from dustfall.forces.registry import trained_models
 from dustfall.scenes import LAWS, MOST_PLACED
+from tests.forces.scenes import random_neighbours
 from workflow import configuration
 from workflow.configuration import ConfigurationError, configure, keys, load_schema, read_file
 from workflow.readers import read_by, readers
@@ -20,6 +22,11 @@ def nested(key: str, value) -> dict:
     for part in reversed(key.split(".")):
         value = {part: value}
     return value
+
+
+def merged(settings: dict, key: str, value) -> dict:
+    section, name = key.split(".")
+    return settings | {section: settings.get(section, {}) | {name: value}}
 
 
 def look_up(config: dict, key: str):
@@ -245,6 +252,84 @@ def test_figures_need_scenes_of_their_law():
     settings = {"scenes": {"number": {"ball": 0}}, "figures": {"radial_law": "ball"}}
     with pytest.raises(ConfigurationError, match=r"figures\.radial_law is ball, but must be a law"):
         configure(settings)
+
+
+def test_every_law_leaves_scenes_for_the_test_and_that_of_the_figures_two(tmp_path):
+    for settings, sentence in (
+        (own_data(tmp_path, 40) | {"idnn": {"folds": 2}}, "own.csv, which has 40 scenes, but must"),
+        (
+            {"scenes": {"number": {"uniform": 140}}, "figures": {"radial_law": "uniform"}},
+            "scenes.number.uniform is 140, but must be at least 150, so that",
+        ),
+        ({"scenes": {"number": {"ball": 50}}}, "ball is 50, but must be 0 or at least 51, so that"),
+    ):
+        with pytest.raises(ConfigurationError) as refusal:
+            configure(merged(settings, "dataset.test_share", 0.01))
+        assert sentence in str(refusal.value)
+        configure(merged(settings, "dataset.test_share", 0.05))
+
+
+def test_two_scenes_of_the_test_have_a_variance_and_three_of_a_law_have_ranks():
+    draws = np.random.default_rng(1)
+    for number, needed, of in (
+        (
+            configuration.TESTED_SCENES,
+            "no variance",
+            lambda m: coefficient_of_determination(*draws.normal(size=(2, m))),
+        ),
+        (
+            configuration.RANKED_SCENES,
+            "rank correlation",
+            lambda m: spearman_by_neighbours(random_neighbours(m), draws.normal(size=(m, 3))),
+        ),
+    ):
+        of(number)
+        with pytest.raises(ValueError, match=needed):
+            of(number - 1)
+
+
+def test_no_model_trains_on_fewer_scenes_than_are_allowed():
+    from dustfall.training import train_model  # here alone, as it takes seconds
+
+    few = configuration.TRAINED_SCENES
+    neighbours, force = random_neighbours(few - 1), np.ones((few - 1, 3))
+    with pytest.raises(ValueError, match=f"training needs {few} or more"):
+        train_model("dense", neighbours, force, "2")
+
+
+@pytest.mark.parametrize(
+    ("settings", "sentence"),
+    [
+        # Two scenes at a share that gives each side one.
+        (
+            {"scenes": {"number": {"contact": 2}}, "dataset": {"test_share": 0.5}},
+            "scenes.number.contact is 2, but must be 0 or at least 3, so that ranks of 3 can be",
+        ),
+        # Six scenes and a share of a tenth leave five.
+        (
+            {
+                "scenes": {"number": {"contact": 6}},
+                "idnn": {"laws_of": {"anchored": ["contact"]}},
+            },
+            "idnn.laws_of.anchored is contact, of which scenes.number and dataset.test_share, 0.1, "
+            "leave 5 scenes to train on, but must be laws that leave at least 10.",
+        ),
+        # Ten scenes a fold, and more than half of those of each law are for the test.
+        (
+            {
+                "scenes": {"number": {"uniform": 7, "ball": 7, "contact": 7}},
+                "dataset": {"test_share": 0.5},
+                "idnn": {"laws": ["uniform", "ball", "contact"], "folds": 2},
+            },
+            "idnn.laws is uniform, ball, contact, of which scenes.number and dataset.test_share, "
+            "0.5, leave 9 scenes",
+        ),
+    ],
+)
+def test_scenes_are_too_few_for_what_is_made_of_them(settings, sentence):
+    with pytest.raises(ConfigurationError) as refusal:
+        configure(settings)
+    assert sentence in str(refusal.value)
 
 
 FILES = {
