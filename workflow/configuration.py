@@ -32,7 +32,8 @@ SCHEMA = Path(__file__).parent / "schemas" / "config.schema.yaml"
 
 ENUMS = {
     "radial laws": list(LAWS),
-    "settling models": settling_models(),
+    # By Stokes drag no velocity ever changes, which leaves spectra and lifetimes nothing to tell.
+    "models of a campaign": [name for name in settling_models() if name != "isolated"],
     "settling models and formulas": ["formulas", *settling_models()],
     "trained models": trained_models(),
 }
