@@ -22,6 +22,7 @@ from dustfall.forces.registry import settling_models, trained_models
 from dustfall.own_data import shape
 from dustfall.scenes import LAWS, densest
 from dustfall.sedimentation.properties import MOST_GALILEO, Properties
+from dustfall.sedimentation.settle import MOST_STEPS
 from dustfall.sedimentation.state import box_length
 from dustfall.suspension.near_field import REACH
 from workflow import plan
@@ -537,6 +538,11 @@ def _check_neighbours(config: dict) -> None:
 
 
 def _require_multiple(key: str, value: float, of: str, step: float, unit: str = "response") -> None:
+    _require(
+        value / step <= MOST_STEPS,
+        f"{key} is {value:g} {unit} times, but must be at most {MOST_STEPS:,} times {of}, which is "
+        f"{step:g}.",
+    )
     steps = round(value / step)
     _require(
         steps >= 1 and abs(value - steps * step) <= 1e-9 * value,

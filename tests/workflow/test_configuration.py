@@ -167,6 +167,13 @@ REFUSED = [
     ("sedimentation.statistics_from", 100, "is 100 response times, but must be at most 88"),
     ("sedimentation.duration", 100.01, "duration is 100.01 response times, but must be a multiple"),
     ("sedimentation.save_every", 0.07, "save_every is 0.07 response times, but must be a multiple"),
+    (
+        "sedimentation.step",
+        1e-307,
+        "is 100 response times, but must be at most 1,000,000,000 times sedimentation.step, which",
+    ),
+    ("sedimentation.long.step", 1e-9, "is 25 spreading times, but must be at most 1,000,000,000"),
+    ("studies.steps", [0.1, 1e-307], "must be at most 1,000,000,000 times one of studies.steps"),
     ("scenes.number.contact", 3, "scenes.number.contact is 3, but must be 0 or at least 6, so"),
     ("idnn.laws", ["cube"], "idnn.laws[0] is cube, but must be one of uniform, ball, contact."),
     ("figures.fit_frequencies", [2, 1], "fit_frequencies is 2 to 1, but must be the lower to"),
