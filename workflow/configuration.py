@@ -404,16 +404,25 @@ def _check_frequencies(config: dict) -> None:
         lines = range(max(first, 1), last + 1)
         # Those of a value a step are averaged in bins before the fit.
         fine = key == "sedimentation.step"
-        values = {
-            math.floor(BINS_PER_DECADE * math.log10(line)) if fine else line for line in lines
-        }
+        values = _bins(lines, FITTED_VALUES) if fine else len(lines)
         _require(
-            len(values) >= FITTED_VALUES,
+            values >= FITTED_VALUES,
             f"figures.fit_frequencies is {low:g} to {high:g}, but must hold at least "
             f"{FITTED_VALUES} of the frequencies that {key} resolves where the state is steady: "
             f"multiples of {resolution:.3g} up to {HIGHEST_FITTED / interval:.3g} per response "
             "time.",
         )
+
+
+def _bins(lines: range, most: int) -> int:
+    """Bins that hold any of these lines, at most so many; it looks at the first line of each."""
+    found: set[int] = set()
+    line = lines.start
+    while line in lines and len(found) < most:
+        own = math.floor(BINS_PER_DECADE * math.log10(line))
+        found.add(own)
+        line = max(line + 1, math.ceil(10 ** ((own + 1) / BINS_PER_DECADE)))
+    return len(found)
 
 
 def _check_start_file(config: dict) -> None:

@@ -1,5 +1,6 @@
 """The configuration is complete, documented, and refused with one sentence where it is wrong."""
 
+import time
 from pathlib import Path
 
 import numpy as np
@@ -388,6 +389,28 @@ def test_frequencies_are_those_that_the_spectra_resolve():
         frequency, density = spectra.power_spectral_density(values, 1.0, method)
         limits = (0.0, spectra.HIGHEST_FITTED)
         assert spectra.spectral_slope(frequency[1:], density[1:], limits=limits).slope
+
+
+@pytest.mark.parametrize(("last", "allowed"), [(125, False), (127, True)])
+def test_lines_of_a_spectrum_count_by_the_bins_that_they_are_averaged_in(last, allowed):
+    # Steps of 0.1 in segments of 1250 resolve multiples of 0.008, and so do frames.
+    times = {"step": 0.1, "save_every": 0.1, "duration": 1000, "statistics_from": 0}
+    settings = {"sedimentation": times | {"long": {"particles": []}}}
+    bins = spectra.averaged_in_bins(np.arange(1, last + 1), np.ones(last))
+    assert (sum(bins["kappa"] >= 100) >= configuration.FITTED_VALUES) == allowed
+    limits = nested("figures.fit_frequencies", [0.8, 0.008 * (last + 0.5)])
+    if allowed:
+        configure(settings | limits)
+    else:
+        with pytest.raises(ConfigurationError, match="at least 3 of the frequencies"):
+            configure(settings | limits)
+
+
+def test_a_spectrum_of_millions_of_lines_is_checked_at_once():
+    times = {"step": 2e-7, "statistics_from": 0}
+    began = time.process_time()
+    configure({"sedimentation": times} | nested("figures.fit_frequencies", [0, 1e12]))
+    assert time.process_time() - began < 2
 
 
 def test_a_start_that_is_a_folder_is_refused(tmp_path):
