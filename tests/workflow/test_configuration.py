@@ -206,6 +206,7 @@ REFUSED = [
         [1, 20],
         "of 1.56 at 20 of sedimentation.galileo.multiples",
     ),
+    ("sedimentation.checkpoint_interval", 0.5, "is 0.5, but must be a whole number at least 1 and"),
     ("sedimentation.start_file", "start.nc", "one file for 18 clouds of different numbers of"),
     ("idnn.layers", ["99999999999/10"], 'idnn.layers[0] is "99999999999/10", but must be hidden'),
     ("scenes.number", {"ball": 0}, "idnn.laws_of.anchored names ball, but must name laws that"),
