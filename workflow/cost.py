@@ -33,6 +33,9 @@ NETWORK_SECONDS = 5e-10
 STEP_SECONDS = {"neighbours": 2.5e-6, "all particles": 1.0e-5}
 """One particle in one step."""
 
+CLOUD_SECONDS = 3e-10
+"""A frozen cloud over the cube of the rows of its matrix, three a particle; 700 take 2e-10."""
+
 SCENE_BYTES = 1500
 """A scene of five neighbours with its record of forces, its place in the data set and its
 predictions."""
@@ -53,6 +56,9 @@ PARTICLE_BYTES = 1000
 
 FRAME_BYTES = 32
 """A particle in a frame, where the spectra of all frames are in memory at once."""
+
+MATRIX_BYTES = 40
+"""An entry of the matrix that couples the particles of a frozen cloud, with its factors."""
 
 WEIGHT_BYTES = 32
 """A weight in double precision with its gradient and both moments of AdamW."""
@@ -99,12 +105,19 @@ def cost(config: dict) -> Cost:
     kept = sum(min(number, stokes["keep_meshes"]) for number in numbers.values())
     audited = min(drawn, stokes["audit"])
     shards = sum(ceil(number / config["scenes"]["shard_size"]) for number in numbers.values())
+    frozen = config["figures"]["frozen_cloud"]
+    rows = 3 * frozen["particles"]
+    clouds = frozen["clouds"] * len(settle["volume_fractions"])
     trainings = list(_trainings(config))
     cases = plan.cases(config)
     pairs = ((plan.neighbours(config) + 1) / 6) ** 2
     seconds = pairs * drawn * SOLVE_SECONDS[stokes["method"]]
     seconds += pairs * (audited + kept) * SOLVE_SECONDS["elements"]
+    # No method audits itself.
+    by_paper = 0 if stokes["method"] == "paper" else min(drawn, stokes["audit_paper"])
+    seconds += pairs * by_paper * SOLVE_SECONDS["paper"]
     seconds += sum(work * NETWORK_SECONDS for work, _ in trainings)
+    seconds += clouds * rows**3 * CLOUD_SECONDS
     # Coordinates, velocities and drag; what is unfinished lies in the checkpoint as well.
     frame = VECTOR_BYTES[settle["precision"]] + 16
     disk, frames, memory = scenes * SCENE_BYTES, [], scenes * SCENE_BYTES
@@ -117,6 +130,7 @@ def cost(config: dict) -> Cost:
         disk += steps * STEP_BYTES
         memory = max(memory, case.particles * PARTICLE_BYTES + frames[-1] * FRAME_BYTES)
     disk += frame * (sum(frames) + max(frames))
+    memory = max(memory, rows**2 * MATRIX_BYTES)
     memory = max(memory, *(weights * WEIGHT_BYTES for _, weights in trainings))
     jobs = 2 * shards + kept + len(trainings) + 2 * len(cases) + OTHER_JOBS
     return Cost(jobs, seconds + jobs * JOB_SECONDS, disk, jobs * PLANNED_BYTES, memory + JOB_BYTES)

@@ -53,6 +53,23 @@ def test_a_campaign_that_is_half_done_needs_half_the_room(tmp_path, monkeypatch)
     check_plan(bound, go_on=False)
 
 
+def test_scenes_that_the_paper_s_formulation_audits_take_seconds_each_and_are_no_more_than_drawn():
+    usual, every = of(), of(stokes={"audit_paper": 32_000})
+    assert every.seconds - usual.seconds > 5 * 31_000
+    assert of(stokes={"audit_paper": 10**6}).seconds == every.seconds
+    # No method audits itself.
+    solved, audited = (of(stokes={"method": "paper", "audit_paper": n}) for n in (0, 32_000))
+    assert solved.seconds == audited.seconds
+
+
+def test_frozen_clouds_take_the_time_and_memory_of_their_matrices():
+    usual, large = of(), of(figures={"frozen_cloud": {"particles": 3000, "clouds": 100}})
+    # A matrix of 9,000 rows and its factors, at each of six volume fractions; no core multiplies
+    # 1e11 times a second.
+    assert large.memory > 2 * 8 * 9000**2
+    assert large.seconds - usual.seconds > 600 * 9000**3 / 3 / 1e11
+
+
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
