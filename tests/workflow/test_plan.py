@@ -202,6 +202,13 @@ def test_studies_are_no_part_of_all_and_take_one_run_a_setting(project):
     }
 
 
+def test_every_file_stays_as_its_checksum_does(project):
+    targets = ("all", "exports", "benchmarks", "studies", "openfoam")
+    words = project.dry_run("--configfile", "config/smoke.yaml", "--", *targets)
+    assert "results/studies/moving_neighbours.nc" in files_of(words, "output")
+    assert "temporary" not in words
+
+
 def test_trial_names_are_file_names_and_lead_back_to_their_layers():
     config = configure({})
     names = [trial.split("/")[1] for trial in plan.trials(config)]

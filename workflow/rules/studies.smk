@@ -8,7 +8,7 @@ rule study_of_a_step:
         ),
         start=[],
     output:
-        trajectory=temp("results/studies/{case}.nc"),
+        trajectory="results/studies/{case}.nc",
         series="results/studies/{case}.series.nc",
     log:
         "logs/studies/{case}.log",
@@ -98,7 +98,7 @@ rule study_of_neighbours:
         model=[],
         start=[],
     output:
-        trajectory=temp("results/studies/{case}_phi{phi}.nc"),
+        trajectory="results/studies/{case}_phi{phi}.nc",
         series="results/studies/{case}_phi{phi}.series.nc",
     log:
         "logs/studies/{case}_phi{phi}.log",
@@ -171,7 +171,7 @@ rule study_of_moving_neighbours:
         model=[],
         start=[],
     output:
-        trajectory=temp("results/studies/{case}_neighbours.nc"),
+        trajectory="results/studies/{case}_neighbours.nc",
         series="results/studies/{case}_neighbours.series.nc",
     log:
         "logs/studies/{case}_neighbours.log",
