@@ -22,6 +22,11 @@ WITHOUT_RESULTS = {
 
 SCRIPTS = ROOT / "workflow" / "scripts"
 
+SHIPPED = ROOT / "dustfall" / "forces" / "data" / "anchored.safetensors"
+"""The model that comes with the library: what calls `load_model` without a file reads it."""
+
+LOADS_SHIPPED = re.compile(r"\bload_model\(\)")
+
 IMPORT = re.compile(
     r"^[ \t]*(?:from[ \t]+([\w.]+)[ \t]+)?import[ \t]+(\([^)]*\)|[^(\n]+)", re.MULTILINE
 )
@@ -33,6 +38,7 @@ def library_files(script: str | Path) -> list[str]:
 
     Sorted paths relative to the repository root. Imports inside functions count. What a package's
     __init__ imports counts only where a name is taken from the package and not from its module.
+    The model that ships is among them where one of them loads it.
     Raises ImportError for a name that a package makes up at run time: its file cannot be told.
     """
     found, waiting = set(), list(_imports(Path(script)))
@@ -73,15 +79,20 @@ def _content(file: str) -> str:
 
 @cache
 def _imports(path: Path) -> frozenset[Path]:
-    """Library files that the file at `path` imports itself."""
+    """Library files that the file at `path` imports or reads itself."""
     return frozenset(_imported(path))
 
 
 def _imported(path: Path) -> Iterator[Path]:
+    if path == SHIPPED:
+        return
+    code = path.read_text(encoding="utf-8")
+    if LOADS_SHIPPED.search(code) and SHIPPED.is_file():
+        yield SHIPPED
     if path.name == "__init__.py" and "iter_modules" in _names(path):
         # A package that looks for its modules itself has them all.
         yield from (module for module in path.parent.glob("*.py") if module != path)
-    for package, names in imports_in(path.read_text(encoding="utf-8")):
+    for package, names in imports_in(code):
         level = len(package) - len(package.lstrip("."))
         if level:
             parents = path.relative_to(ROOT).parts[:-level]

@@ -4,7 +4,15 @@ import ast
 
 import pytest
 
-from workflow.library import ROOT, WITHOUT_RESULTS, imports_in, library_files
+from dustfall.forces import learned
+from workflow.library import (
+    LOADS_SHIPPED,
+    ROOT,
+    SHIPPED,
+    WITHOUT_RESULTS,
+    imports_in,
+    library_files,
+)
 
 SCRIPTS = sorted((ROOT / "workflow/scripts").glob("*.py"))
 
@@ -52,6 +60,33 @@ def test_a_package_that_looks_for_its_modules_brings_them_all(tmp_path):
 def test_a_name_made_up_at_run_time_is_refused(tmp_path):
     with pytest.raises(ImportError, match=r"train_model from dustfall\.forces.*from its module"):
         files_of(tmp_path, "from dustfall.forces import train_model")
+
+
+def test_the_model_that_ships_counts_where_it_is_loaded_and_nowhere_else(tmp_path):
+    assert SHIPPED == learned.SHIPPED
+    model = SHIPPED.relative_to(ROOT).as_posix()
+    load = "from dustfall.forces.learned import load_model\nload_model({})"
+    for name, code, watched in (
+        ("shipped", load.format(""), True),
+        ("other", load.format("'results/model/anchored.safetensors'"), False),
+        ("through", "import dustfall.benchmarks.settling_cost", True),
+    ):
+        (tmp_path / name).mkdir()
+        assert (model in files_of(tmp_path / name, code)) == watched, name
+    watching = {script.stem for script in SCRIPTS if model in library_files(script)}
+    assert watching == {"moving_spheres", "settling_benchmark", "openfoam_settling"}
+
+
+def test_every_call_that_loads_the_model_that_ships_is_found():
+    for file in [*ROOT.glob("dustfall/**/*.py"), *ROOT.glob("workflow/**/*.py")]:
+        code = file.read_text(encoding="utf-8")
+        calls = {
+            ast.unparse(node)
+            for node in ast.walk(ast.parse(code))
+            if isinstance(node, ast.Call) and not (node.args or node.keywords)
+        }
+        names = {call.removesuffix("()").rsplit(".", 1)[-1] for call in calls}
+        assert ("load_model" in names) == bool(LOADS_SHIPPED.search(code)), file
 
 
 def imports_of_the_parser(code: str) -> set[tuple[str, tuple[str, ...]]]:

@@ -6,6 +6,7 @@ import pytest
 import yaml
 
 from tests.workflow.conftest import jobs_of
+from workflow.library import ROOT, SHIPPED
 from workflow.readers import read_by, readers
 
 SMOKE = ("--configfile", "config/smoke.yaml")
@@ -237,6 +238,21 @@ def test_a_new_time_of_a_library_file_is_no_edit(rehearsal):
     for path in (rehearsal.folder / "dustfall").rglob("*.py"):
         path.touch()
     assert rehearsal.plan(*SMOKE, "--", "all") == {}
+
+
+def test_another_model_that_ships_reruns_what_loads_it_and_no_training_or_settling(rehearsal):
+    table = "results/studies/moving_spheres.csv"
+    (rehearsal.folder / table).parent.mkdir(parents=True, exist_ok=True)
+    (rehearsal.folder / table).touch()
+    rehearsal.run(*SMOKE, "--touch", "--forceall", "--", table)
+    path = rehearsal.folder / SHIPPED.relative_to(ROOT)
+    model = path.read_bytes()
+    try:
+        path.write_bytes(model + b"another")
+        assert rehearsal.plan(*SMOKE, "--", "all", table) == {"moving_spheres": 1}
+    finally:
+        path.write_bytes(model)
+    assert rehearsal.plan(*SMOKE, "--", "all", table) == {}
 
 
 def test_a_formula_added_as_one_file_reruns_what_compares_models_and_no_training(rehearsal):
