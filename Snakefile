@@ -13,7 +13,7 @@ from dustfall.forces.registry import trained_models
 from workflow import plan, stops, terminal
 from workflow.configuration import ConfigurationError, configure, read_file
 from workflow.cost import GO_ON, CostError, check_jobs, check_plan, cost
-from workflow.library import ROOT, cache_on_node, digest, library_files
+from workflow.library import ROOT, cache_on_node, digest, library_files, named_by
 
 min_version("9.0")
 

@@ -12,6 +12,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 
+PACKAGES = ("dustfall", "openfoam")
+
 WITHOUT_RESULTS = {
     "dustfall/extras.py",
     "dustfall/files.py",
@@ -34,7 +36,7 @@ COMMENT = re.compile("#.*")
 
 
 def library_files(script: str | Path) -> list[str]:
-    """Files of `dustfall`, and what scripts share, that `script` imports, be it through others.
+    """Files of `PACKAGES`, and what scripts share, that `script` imports, be it through others.
 
     Sorted paths relative to the repository root. Imports inside functions count. What a package's
     __init__ imports counts only where a name is taken from the package and not from its module.
@@ -48,6 +50,12 @@ def library_files(script: str | Path) -> list[str]:
             found.add(path)
             waiting.extend(_imports(path))
     return sorted({path.relative_to(ROOT).as_posix() for path in found} - WITHOUT_RESULTS)
+
+
+def named_by(*patterns: str) -> list[str]:
+    """Sorted paths, relative to the repository root, of the files that glob patterns name."""
+    found = {path for pattern in patterns for path in ROOT.glob(pattern) if path.is_file()}
+    return sorted(path.relative_to(ROOT).as_posix() for path in found)
 
 
 def digest(files: Iterable[str]) -> str:
@@ -128,10 +136,10 @@ def _shared(name: str) -> list[Path]:
 
 
 def _module(name: str) -> list[Path]:
-    """File of a module of the library; none for other modules."""
+    """File of a module of `PACKAGES`; none for other modules."""
     place = ROOT.joinpath(*name.split("."))
     files = [place.with_suffix(".py"), place / "__init__.py"]
-    return [file for file in files if name.split(".")[0] == "dustfall" and file.is_file()][:1]
+    return [file for file in files if name.split(".")[0] in PACKAGES and file.is_file()][:1]
 
 
 @cache

@@ -1,3 +1,9 @@
+# What the plugin is built from, and beside it what a case is a copy of. No pattern reaches into the
+# folders that a build fills.
+PLUGIN = named_by("cpp/dustfall/*", "openfoam/*", "openfoam/Make/*", "openfoam/foundation/Make/*")
+CASE = named_by("openfoam/cases/settling/**/*")
+
+
 rule openfoam_settling:
     """The same cloud in OpenFOAM, by the plugin of `make openfoam`, and in this package."""
     output:
@@ -7,13 +13,8 @@ rule openfoam_settling:
     localrule: True
     params:
         library=library("openfoam_settling.py"),
-        plugin=digest(
-            sorted(
-                path.relative_to(ROOT).as_posix()
-                for folder in ("cpp/dustfall", "openfoam/cases", "openfoam")
-                for path in (ROOT / folder).glob("*.[pChH]*")
-            )
-        ),
+        sources=PLUGIN,
+        plugin=digest([*PLUGIN, *CASE]),
         seed=config["seed"],
         stream=plan.start_stream("openfoam"),
         particles=config["studies"]["particles"],

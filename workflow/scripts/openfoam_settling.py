@@ -14,6 +14,7 @@ from dustfall.figures.openfoam import inverse_beta_in_time
 from dustfall.figures.style import save
 from dustfall.forces.learned import load_model
 from dustfall.sedimentation import NearestNeighbours, Properties, State, random_start, step
+from workflow.library import ROOT
 
 FRAMES = 100  # of OpenFOAM's run: it writes them as text
 
@@ -21,6 +22,10 @@ progress = joblog.start(snakemake)
 params = snakemake.params
 if shutil.which("icoUncoupledKinematicParcelFoam") is None or not PLUGIN.exists():
     raise RuntimeError("OpenFOAM or the plugin is missing here; `make openfoam` sets both up")
+built = PLUGIN.stat().st_mtime
+newer = [file for file in params.sources if (ROOT / file).stat().st_mtime > built]
+if newer:
+    raise RuntimeError(f"{newer[0]} is newer than the plugin; `make openfoam` builds it anew")
 
 properties, model = Properties(**params.properties), load_model()
 start = random_start(params.particles, params.volume_fraction, params.seed, params.stream, "stokes")
