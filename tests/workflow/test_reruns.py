@@ -240,6 +240,11 @@ def test_a_new_time_of_a_library_file_is_no_edit(rehearsal):
     assert rehearsal.plan(*SMOKE, "--", "all") == {}
 
 
+@pytest.mark.parametrize("key", ["scenes.neighbours", "dataset.file", "sedimentation.model"])
+def test_the_study_of_steps_has_the_model_and_the_neighbours_of_the_campaign(key):
+    assert {"sedimentation", "study_of_a_step"} <= set(read_by(key, READERS))
+
+
 def test_another_model_that_ships_reruns_what_loads_it_and_no_training_or_settling(rehearsal):
     table = "results/studies/moving_spheres.csv"
     (rehearsal.folder / table).parent.mkdir(parents=True, exist_ok=True)

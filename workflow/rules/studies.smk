@@ -22,6 +22,7 @@ rule study_of_a_step:
         seed=config["seed"],
         stream=plan.start_stream("step"),
         model=config["sedimentation"]["model"],
+        neighbours=plan.neighbours(config),
         particles=config["studies"]["particles"],
         volume_fraction=config["studies"]["volume_fraction"],
         galileo_multiple=1.0,
