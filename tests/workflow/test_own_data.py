@@ -56,6 +56,31 @@ def test_models_of_ten_neighbours_are_swept_trained_and_drawn_and_settle_a_cloud
         assert np.isfinite(series["settling_velocity_mean"]).all()
 
 
+@pytest.mark.slow
+def test_a_cloud_is_as_crowded_as_the_densest_scene_of_ones_own_data_and_not_of_the_drawn(own):
+    table = pd.read_csv(own.folder / "fixed_array.csv")
+    share = []
+    # All but the last scene are far more dilute than any cloud; the last is as dense as told.
+    for densest in (1e-9, 0.5):
+        table["volume_fraction"] = [*[1e-10] * (len(table) - 1), densest]
+        table.to_csv(own.folder / "dense.csv", index=False)
+        settings = [
+            "dataset={file: dense.csv}",
+            "sedimentation={model: rotne_prager, particles: [100], volume_fractions: [1.0e-3], "
+            "long: {particles: []}, all_particles: {particles: []}}",
+        ]
+        file = "results/analysis/local_volume_fraction.csv"
+        own.run(
+            *("--configfile", "config/smoke.yaml", "--cores", "1", "--config"),
+            *settings,
+            "--",
+            file,
+        )
+        share.append(pd.read_csv(own.folder / file)["above"])
+    assert (share[0] == 1).all()
+    assert (share[1] < 1e-3).all()
+
+
 def test_files_that_do_not_fit_are_refused_with_a_sentence(own):
     (own.folder / "few.csv").write_text(
         "x1,y1,z1,force_x,force_y,force_z\n" + "1,2,3,4,5,6\n" * 100

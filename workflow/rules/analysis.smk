@@ -82,6 +82,8 @@ rule local_volume_fraction:
     """Volume fraction around each particle by its fifth neighbour, at the start and when steady."""
     input:
         trajectories=expand("results/sedimentation/{case}.nc", case=SETTLED_LARGEST_CASES),
+        # Data of one's own tell themselves how dense they are.
+        data="results/dataset/forces.h5" if config["dataset"]["file"] else [],
     output:
         "results/analysis/local_volume_fraction.csv",
     log:
@@ -90,7 +92,7 @@ rule local_volume_fraction:
     params:
         library=library("local_volume_fraction.py"),
         starts=[plan.statistics_from(config, case) for case in SETTLED_LARGEST_CASES],
-        densest=config["scenes"]["phi_max"],
+        densest=None if config["dataset"]["file"] else config["scenes"]["phi_max"],
     script:
         "../scripts/local_volume_fraction.py"
 
