@@ -710,17 +710,21 @@ def collect(campaign: Path, target: Path, found: Provenance, tables=None) -> Non
 
     A table is left out, and one of a former campaign removed, where a source is missing from the
     folder `campaign`, or where it has no rows. Raises FileNotFoundError where the campaign has not
-    even its configuration.
+    even its configuration; what fails leaves the folder as it is.
     """
+    configuration = (campaign / CONFIGURATION).read_bytes()
+    reduced = {
+        name: reduce(*(_read(campaign / path) for path in paths))
+        for name, (reduce, paths) in (TABLES if tables is None else tables).items()
+        if all((campaign / path).exists() for path in paths)
+    }
     target.mkdir(parents=True, exist_ok=True)
     for old in target.glob("*.csv"):
         old.unlink()
-    shutil.copyfile(campaign / CONFIGURATION, target / "config.yaml")
-    for name, (reduce, paths) in (TABLES if tables is None else tables).items():
-        if all((campaign / path).exists() for path in paths):
-            table = reduce(*(_read(campaign / path) for path in paths))
-            if not table.empty:
-                table.to_csv(target / f"{name}.csv", index=False)
+    (target / "config.yaml").write_bytes(configuration)
+    for name, table in reduced.items():
+        if not table.empty:
+            table.to_csv(target / f"{name}.csv", index=False)
     text = json.dumps(found._asdict(), indent=2)
     (target / "provenance.json").write_text(text + "\n", encoding="utf-8")
 

@@ -56,6 +56,17 @@ def test_models_of_ten_neighbours_are_swept_trained_and_drawn_and_settle_a_cloud
         assert np.isfinite(series["settling_velocity_mean"]).all()
 
 
+def test_the_pages_of_the_docs_are_refused_before_any_file_of_theirs_changes(own):
+    docs = own.folder / "docs"
+    assert own.plan(*SMALL, "--", "validation") == {"validation": 1}
+    before = {path: path.read_bytes() for path in docs.rglob("*") if path.is_file()}
+    done = own.snakemake("--cores", "1", *SMALL, "--", "validation")
+    assert done.returncode == 1
+    sentence = "Stopped: validation: dataset.file is fixed_array.csv, but must be empty: the pages"
+    assert done.stderr.splitlines()[-1].startswith(sentence)
+    assert {path: path.read_bytes() for path in docs.rglob("*") if path.is_file()} == before
+
+
 @pytest.mark.slow
 def test_a_cloud_is_as_crowded_as_the_densest_scene_of_ones_own_data_and_not_of_the_drawn(own):
     table = pd.read_csv(own.folder / "fixed_array.csv")

@@ -180,6 +180,20 @@ def test_a_table_without_its_source_is_left_out_and_a_former_one_removed(benchma
     }
 
 
+@pytest.mark.parametrize("lost", ["results/benchmarks/stress.csv", validation.CONFIGURATION])
+def test_what_cannot_be_reduced_leaves_all_tables_as_they_are(benchmarked, tmp_path, lost):
+    target = tmp_path / "tables"
+    validation.collect(benchmarked, target, FOUND)
+    before = {path.name: path.read_bytes() for path in target.iterdir()}
+    (benchmarked / "results/benchmarks/solver.csv").unlink()
+    path = benchmarked / lost
+    # A summary of another kind of campaign has other columns.
+    path.write_text("column\n1\n") if path.suffix == ".csv" else path.unlink()
+    with pytest.raises((KeyError, FileNotFoundError)):
+        validation.collect(benchmarked, target, FOUND)
+    assert {path.name: path.read_bytes() for path in target.iterdir()} == before
+
+
 def test_what_is_left_out_is_said_in_its_place(benchmarked, tmp_path):
     validation.collect(benchmarked, tmp_path / "tables", FOUND)
     text = validation.page(TEMPLATE, tmp_path / "tables")

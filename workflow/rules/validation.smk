@@ -21,8 +21,9 @@ FURTHER = [
 rule validation:
     """Write this campaign's numbers into docs/: no part of `all`, as it changes the project."""
     input:
-        campaign=rules.all.input,
-        further=[file for file in FURTHER if os.path.exists(file)],
+        # With data of one's own it is refused, which nothing has to be made for.
+        campaign=[] if config["dataset"]["file"] else rules.all.input,
+        further=[file for file in FURTHER if os.path.exists(file) and not config["dataset"]["file"]],
         templates=[
             ROOT / "docs" / f"{name}.md.jinja" for name in ("validation", "all_particles", "paper")
         ],
@@ -31,6 +32,7 @@ rule validation:
         "logs/validation.log",
     params:
         docs="docs",
+        own_data=config["dataset"]["file"],
         configuration=", ".join(os.path.relpath(file) for file in workflow.configfiles),
     script:
         "../scripts/validation.py"

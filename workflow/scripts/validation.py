@@ -9,6 +9,11 @@ from workflow.validation import PAGES, collect, copy_pictures, page, provenance
 joblog.start(snakemake)
 
 params = snakemake.params
+if params.own_data:
+    raise ValueError(
+        f"dataset.file is {params.own_data}, but must be empty: the pages of the docs are about "
+        "scenes that a campaign draws and solves itself"
+    )
 campaign, docs = Path(), Path(params.docs)
 found = provenance(params.configuration)
 copy_pictures(campaign, docs / "pictures")
