@@ -11,6 +11,7 @@ import pytest
 import yaml
 
 from dustfall.benchmarks.solver import MULTIPOLE
+from tests.workflow.conftest import files_of
 from workflow import validation
 from workflow.pages import Written, markdown_table, read_tables, render, wide
 
@@ -154,6 +155,12 @@ def test_the_page_is_no_part_of_all_and_needs_all_of_it(project):
     whole = project.plan("--", "all")
     page = project.plan("--", "validation")
     assert page == whole | {"validation": 1}
+
+
+def test_the_rule_has_the_template_of_every_page_and_no_other(project):
+    words = project.dry_run("--configfile", "config/smoke.yaml", "--", "validation")
+    named = {Path(name).name for name in files_of(words, "input") if name.endswith(".jinja")}
+    assert named == {f"{name}.md.jinja" for name in validation.PAGES}
 
 
 def test_readme_leaves_measured_numbers_to_the_page():

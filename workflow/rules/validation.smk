@@ -24,9 +24,7 @@ rule validation:
         # With data of one's own it is refused, which nothing has to be made for.
         campaign=[] if config["dataset"]["file"] else rules.all.input,
         further=[file for file in FURTHER if os.path.exists(file) and not config["dataset"]["file"]],
-        templates=[
-            ROOT / "docs" / f"{name}.md.jinja" for name in ("validation", "all_particles", "paper")
-        ],
+        templates=sorted((ROOT / "docs").glob("*.md.jinja")),
     # Without an output it runs whenever it is asked for: the page at hand may be of another campaign.
     log:
         "logs/validation.log",

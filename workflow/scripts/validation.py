@@ -17,7 +17,8 @@ if params.own_data:
 campaign, docs = Path(), Path(params.docs)
 found = provenance(params.configuration)
 copy_pictures(campaign, docs / "pictures")
-for (name, tables), template in zip(PAGES.items(), snakemake.input.templates, strict=True):
+templates = {Path(file).name: Path(file) for file in snakemake.input.templates}
+for name, tables in PAGES.items():
     collect(campaign, docs / name, found, tables)
     with atomic(docs / f"{name}.md") as path:
-        path.write_text(page(Path(template), docs / name), encoding="utf-8")
+        path.write_text(page(templates[f"{name}.md.jinja"], docs / name), encoding="utf-8")
