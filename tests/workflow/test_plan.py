@@ -7,6 +7,7 @@ from dustfall.sedimentation import Schedule
 from tests.workflow.conftest import files_of
 from workflow import plan
 from workflow.configuration import configure
+from workflow.readers import read_by, readers
 
 UNIFORM = {"idnn": {"laws_of": {"anchored": ["uniform"]}}}
 """What a campaign sets that has scenes of this law alone."""
@@ -200,6 +201,19 @@ def test_studies_are_no_part_of_all_and_take_one_run_a_setting(project):
         "moving_neighbours": 1,
         "moving_spheres": 1,
     }
+
+
+def test_the_training_in_the_papers_way_has_the_scenes_of_the_campaigns_idnn():
+    found = readers()
+    for key in ("dataset.file", "idnn.laws"):
+        assert {"sweep", "paper_training"} <= set(read_by(key, found))
+
+
+def test_on_a_cluster_the_training_in_the_papers_way_has_the_time_that_it_takes(project):
+    profile = yaml.safe_load((project.folder / "profiles/slurm/config.yaml").read_text())
+    minutes = profile["set-resources"]["paper_training"]["runtime"]
+    # The 80 minutes of one core, and half as many again for a slower one.
+    assert int(minutes.removesuffix(" * attempt")) >= 1.5 * 80
 
 
 def test_every_file_stays_as_its_checksum_does(project):

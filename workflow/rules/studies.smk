@@ -88,6 +88,7 @@ rule paper_training:
         library=library("paper_training.py"),
         seed=config["seed"],
         test_share=config["dataset"]["test_share"],
+        laws=plan.laws(config, "idnn"),
         device=config["idnn"]["device"],
     script:
         "../scripts/paper_training.py"

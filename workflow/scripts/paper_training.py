@@ -10,7 +10,7 @@ progress = joblog.start(snakemake)
 params = snakemake.params
 
 training, test = split(read(snakemake.input.data), params.test_share, params.seed)
-training, test = training.of_laws(["uniform"]), test.of_laws(["uniform"])
+training, test = training.of_laws(params.laws), test.of_laws(params.laws)
 model = train_model(
     "idnn",
     training.neighbours,
