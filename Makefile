@@ -17,8 +17,8 @@ APT_INSTALL := apt-get update && apt-get install -y --no-install-recommends
 	gmsh-libraries clean-environment
 
 run: environment
-	@$(VENV)/bin/python -m workflow.configuration $(CONFIG)
-	$(VENV)/bin/snakemake --configfile $(CONFIG) -- all
+	@$(VENV)/bin/python -m workflow.configuration "$(CONFIG)"
+	$(VENV)/bin/snakemake --configfile "$(CONFIG)" -- all
 
 # The environment of `make run`, where every command of the README works as it is written.
 shell: environment

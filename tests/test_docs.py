@@ -60,6 +60,21 @@ def test_a_call_of_make_has_its_target(command):
     assert re.search(rf"^{target}:", (ROOT / "Makefile").read_text(), re.M)
 
 
+def test_make_run_takes_a_file_whose_path_has_spaces():
+    # Of a dry run make still runs what makes the environment; it is taken for made.
+    done = subprocess.run(
+        ["make", "-n", "-o", "environment", "run", "CONFIG=my files/a config.yaml"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    lines = [shlex.split(line) for line in done.stdout.splitlines() if "yaml" in line]
+    assert len(lines) == 2
+    for words in lines:
+        assert "my files/a config.yaml" in words
+
+
 @pytest.mark.parametrize("command", parametrized(r"^    dustfall ([^\n#]*)"))
 def test_a_call_of_dustfall_is_understood(command):
     arguments = shlex.split(command)
