@@ -10,6 +10,7 @@ from dustfall.sedimentation.settle import Checkpoint, Output, Schedule, settle
 from dustfall.sedimentation.start import random_start, read_start, start_from
 from dustfall.sedimentation.state import Closure
 from workflow import stops
+from workflow.checksums import CHECKPOINTS
 
 
 def settle_case(snakemake, closure: Closure, properties: Properties, progress: Callable) -> None:
@@ -59,7 +60,7 @@ def _checkpoint(snakemake) -> Path:
     for file in (snakemake.input.get("model"), snakemake.input.start):
         state.update(Path(file).read_bytes() if file else b"none")
     case = Path(snakemake.output.trajectory).stem
-    folder = Path(snakemake.output.trajectory).parent / "checkpoints"
+    folder = Path(snakemake.output.trajectory).parent / CHECKPOINTS
     for other in folder.glob(f"{case}-*"):
         if other.name != f"{case}-{state.hexdigest()[:16]}":
             shutil.rmtree(other)
