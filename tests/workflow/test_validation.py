@@ -21,6 +21,15 @@ TEMPLATE = DOCS / "validation.md.jinja"
 TABLES = DOCS / "validation"
 PAGE = (DOCS / "validation.md").read_text(encoding="utf-8")
 
+EMPTY = {
+    # Nearest neighbours multiply by no mobility.
+    "all_particles/settling_cost.csv": {
+        "products_nearest_neighbours_1",
+        "products_nearest_neighbours_2",
+    },
+}
+"""Columns of the tables of the docs that have no values, of a table that has any such."""
+
 SOLVER = pd.DataFrame(
     [
         ("phi from 1e-8", MULTIPOLE, "tolerance 1e-2", 50, 0.4, 1e-5, 1e-3, 1.0, 3.0),
@@ -102,6 +111,19 @@ def test_every_row_of_a_table_shows_in_the_page(table, tmp_path):
 
 def changed_digit(digit: re.Match) -> str:
     return str(9 - int(digit[0]))
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        f"{page}/{path.name}"
+        for page in validation.PAGES
+        for path in sorted((DOCS / page).glob("*.csv"))
+    ],
+)
+def test_no_column_of_a_table_is_empty_but_those_that_count_what_there_is_none_of(table):
+    found = pd.read_csv(DOCS / table)
+    assert set(found.columns[found.isna().all()]) == EMPTY.get(table, set())
 
 
 def test_the_page_tells_code_day_machine_and_configuration():
