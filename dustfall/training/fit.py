@@ -83,6 +83,10 @@ PAPER_SETTINGS = TrainingSettings(
 """Full batch, patience and validation as in the paper; rate and decay, not given there, are
 PyTorch's defaults for AdamW, and the epochs what an hour or so on one core takes."""
 
+CONSTANT = 1e-9
+"""Deviation of an input, over its mean or one, below which it is the rounding of a constant: a
+network's input is not divided by it."""
+
 
 @dataclass(frozen=True)
 class History:
@@ -301,8 +305,8 @@ def train_networks(
     units = [float(np.sqrt(np.mean(target[rows] ** 2))) or 1.0 for rows, _ in splits]
     seen = [scenes.inputs[rows].reshape(-1, features) for rows, _ in splits]
     means, scales = [rows.mean(axis=0) for rows in seen], [rows.std(axis=0) for rows in seen]
-    for scale in scales:
-        scale[scale == 0.0] = 1.0
+    for mean, scale in zip(means, scales, strict=True):
+        scale[scale <= CONSTANT * np.maximum(1.0, np.abs(mean))] = 1.0
     normal = [(scenes.inputs - mean) / scale for mean, scale in zip(means, scales, strict=True)]
     tensors = [
         torch.from_numpy(np.stack(arrays).astype(np.float32)).to(device)

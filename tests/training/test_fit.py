@@ -188,6 +188,17 @@ def test_the_unit_of_the_weights_does_not_matter(samples):
     np.testing.assert_array_equal(one, other)
 
 
+def test_an_input_that_is_constant_up_to_rounding_is_not_blown_up(samples):
+    neighbours, force = (part[:500] for part in samples)
+    planar = neighbours * [1.0, 1.0, 0.0]
+    model = train_model("pairwise", planar, force, "8", TrainingSettings(epochs=1))
+    for network in model.networks.values():
+        assert network.scale[2] == 1.0
+        assert (network.scale[:2] > 0.1).all()
+    other = train_model("pairwise", neighbours, force, "8", TrainingSettings(epochs=1))
+    assert (other.networks["lateral"].scale != 1.0).all()
+
+
 @pytest.mark.parametrize("weight", [np.zeros(100), np.ones(99), np.full(100, np.nan)])
 def test_weights_that_weigh_nothing_are_refused(samples, weight):
     neighbours, force = (part[:100] for part in samples)
