@@ -77,5 +77,9 @@ def run(options) -> None:
     model.header["training"]["command"] = options.command
     model.save(options.output)
     scores = model.header["training"]["validation"]
-    told = ", ".join(f"{component} {score['r2']:.6f}" for component, score in scores.items())
+    told = ", ".join(f"{component} {_shown(score['r2'])}" for component, score in scores.items())
     print(f"{options.output}: R^2 of the validation samples: {told}", file=sys.stderr)
+
+
+def _shown(r2: float | None) -> str:
+    return "none, it is the same in all" if r2 is None else f"{r2:.6f}"

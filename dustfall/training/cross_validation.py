@@ -35,9 +35,10 @@ def cross_validate(
     Parameters: `neighbours` (m, k, 3) in d_p, `force` (m, 3) in Re_p c_D, `component` streamwise
     or lateral, the rest as in `training.train_model`. Returns plain values for a JSON file:
     component, kind, layers, neighbours and parameters (their numbers), and `folds`, a list with
-    fold, mse [(Re_p c_D)^2], r2 and epochs (of the weights kept). As in the paper the fold that
-    scores also picks the epoch. A fold depends on (seed, component, fold) alone: it has the same
-    bits in any sweep. `progress(done, total)` counts epochs.
+    fold, mse [(Re_p c_D)^2], r2 (None where the force is the same in the whole fold) and epochs (of
+    the weights kept). As in the paper the fold that scores also picks the epoch. A fold depends on
+    (seed, component, fold) alone: it has the same bits in any sweep. `progress(done, total)` counts
+    epochs.
 
     Raises ValueError for arguments out of range.
     """

@@ -23,6 +23,9 @@ with extra("train"):
 VALIDATION_SHARE = 0.1
 """Share of the samples kept for validation (paper, section "Deterministic model")."""
 
+FEWEST_VALIDATED = 2
+"""Fewest samples kept for validation: the force on one has no spread that R^2 could tell of."""
+
 
 @dataclass(frozen=True)
 class TrainingSettings:
@@ -208,9 +211,10 @@ def train_model(
     Re_p c_D; `layers` hidden widths as in "40-40/30-30-30" (dense and pairwise: one block);
     `settings` by default those of `SETTINGS`; `radial_input` what the spherical coordinates give
     for the distance, "distance" or "logarithm" (unit vectors come with 1/r and log r). One sample
-    in ten, drawn from the seed, is kept for validation. `device` is PyTorch's, "cpu" or "cuda": on
-    the CPU the same arguments give the same bits on one machine. `progress(done, total)` counts
-    epochs. `weight` (m,), of a sample's squared error in training and validation; None: all alike.
+    in ten, two at least, drawn from the seed, is kept for validation. `device` is PyTorch's, "cpu"
+    or "cuda": on the CPU the same arguments give the same bits on one machine. `progress(done,
+    total)` counts epochs. `weight` (m,), of a sample's squared error in training and validation;
+    None: all alike.
 
     Raises ValueError for arguments out of range and FloatingPointError when training diverges.
     """
@@ -220,7 +224,7 @@ def train_model(
     weight = check_weight(weight, len(force))
     scenes, largest = training_scenes(kind, neighbours, radial_input)
     shuffled = stream(Purpose.VALIDATION, seed).permutation(len(neighbours))
-    kept = max(1, round(VALIDATION_SHARE * len(neighbours)))
+    kept = max(FEWEST_VALIDATED, round(VALIDATION_SHARE * len(neighbours)))
     validation, training = np.sort(shuffled[:kept]), np.sort(shuffled[kept:])
     networks, history, scores = {}, {}, {}
     for number, component in enumerate(COMPONENTS):
@@ -351,11 +355,12 @@ def score(
     component: str,
     rows: np.ndarray,
     weight: np.ndarray | None = None,
-) -> dict[str, float]:
+) -> dict[str, float | None]:
     """Return the mean squared error and R^2 of a component on some rows, in float64.
 
-    R^2 is that of the force itself, all of the component's columns together (their own means).
-    `weight` (m,) are those of the samples.
+    R^2 is that of the force itself, all of the component's columns together (their own means), and
+    None where the force is the same in all rows: JSON has no number for it. `weight` (m,) are those
+    of the samples.
     """
     target = force[rows][:, COMPONENTS[component]]
     residual = network.residual(scenes.inputs, scenes.envelope)
@@ -366,7 +371,9 @@ def score(
         share = weight[rows] / weight[rows].mean()
         error = error * share[:, None]
         spread = (share @ (target - np.average(target, axis=0, weights=share)) ** 2).sum()
-    return {"mse": float(error.mean()), "r2": float(1 - error.sum() / spread)}
+    varies = spread > 0 and np.ptp(target, axis=0).any()
+    r2 = float(1 - error.sum() / spread) if varies else None
+    return {"mse": float(error.mean()), "r2": r2}
 
 
 def check_samples(neighbours, force, fewest: int) -> tuple[np.ndarray, np.ndarray]:

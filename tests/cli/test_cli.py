@@ -160,6 +160,14 @@ def test_a_formula_is_exported_for_as_many_neighbours_as_one_wants(tmp_path):
     assert json.loads((tmp_path / "model.json").read_text())["neighbours"] == 3
 
 
+def test_training_on_a_force_that_does_not_vary_says_that_it_has_no_score(tmp_path, capsys):
+    rows = np.hstack([random_neighbours(20, number=1)[:, 0], np.tile([0.0, 24.0, 0.0], (20, 1))])
+    np.savetxt(tmp_path / "samples.csv", rows, delimiter=",")
+    command = "train {0}/samples.csv --kind dense --layers 4 --epochs 1 -o {0}/m.safetensors"
+    assert run(command, tmp_path) == 0
+    assert "streamwise none, it is the same in all" in capsys.readouterr().err
+
+
 ERRORS = {
     "": "required: COMMAND; see dustfall --help",
     "settel": "invalid choice: 'settel'",

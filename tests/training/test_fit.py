@@ -1,6 +1,9 @@
+import json
+
 import numpy as np
 import pytest
 import torch
+from safetensors import safe_open
 
 from dustfall.forces.formulas.reflections import MODEL as REFLECTED
 from dustfall.streams import Purpose, stream
@@ -197,6 +200,27 @@ def test_an_input_that_is_constant_up_to_rounding_is_not_blown_up(samples):
         assert (network.scale[:2] > 0.1).all()
     other = train_model("pairwise", neighbours, force, "8", TrainingSettings(epochs=1))
     assert (other.networks["lateral"].scale != 1.0).all()
+
+
+@pytest.mark.parametrize("number", [10, 14, 15])
+def test_of_few_samples_two_are_kept_for_validation(samples, number):
+    neighbours, force = (part[:number] for part in samples)
+    model = train_model("dense", neighbours, force, "4", TrainingSettings(epochs=1))
+    rows = stream(Purpose.VALIDATION, 1).permutation(number)[:2]
+    score = model.header["training"]["validation"]["streamwise"]
+    expected = r2(model.predict(neighbours[rows])[:, 1], force[rows, 1])
+    assert score["r2"] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("weight", [None, np.arange(1.0, 31.0)])
+def test_a_force_that_does_not_vary_has_no_r2_and_a_header_of_json(samples, tmp_path, weight):
+    force = np.tile([0.1, 24.3, 0.0], (30, 1))
+    settings = TrainingSettings(epochs=1)
+    model = train_model("dense", samples[0][:30], force, "4", settings, weight=weight)
+    model.save(tmp_path / "model.safetensors")
+    with safe_open(tmp_path / "model.safetensors", framework="numpy") as file:
+        header = json.loads(file.metadata()["header"], parse_constant=pytest.fail)
+    assert [score["r2"] for score in header["training"]["validation"].values()] == [None, None]
 
 
 @pytest.mark.parametrize("weight", [np.zeros(100), np.ones(99), np.full(100, np.nan)])

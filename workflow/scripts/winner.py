@@ -15,6 +15,7 @@ joblog.start(snakemake)
 results = [json.loads(Path(path).read_text()) for path in snakemake.input.results]
 winner = choose_winner(results, snakemake.params.choice)
 folds = pd.concat(pd.DataFrame(result.pop("folds")).assign(**result) for result in results)
+folds["r2"] = folds["r2"].astype(float)  # none where the force does not vary
 folds["multiplications"] = [
     multiplications(*trial)
     for trial in folds[["kind", "layers", "component", "neighbours"]].itertuples(index=False)
