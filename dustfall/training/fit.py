@@ -271,7 +271,7 @@ def train_model(
         "training": {
             "samples": len(neighbours),
             "data_sha256": data_hash(neighbours, force, *([] if weight is None else [weight])),
-            "seed": seed,
+            "seed": int(seed),  # NumPy's integers are none of JSON's
             "settings": asdict(settings),
             "validation": scores,
             "versions": {"dustfall": __version__, "torch": torch.__version__},

@@ -58,6 +58,15 @@ def test_the_same_seed_gives_the_same_bits(models, samples, tmp_path, threads):
     assert first.read_bytes() == second.read_bytes()
 
 
+def test_a_seed_of_numpy_gives_the_same_file(samples, tmp_path):
+    neighbours, force = (part[:100] for part in samples)
+    for name, seed in (("one", 3), ("other", np.int64(3))):
+        model = train_model("dense", neighbours, force, "4", TrainingSettings(epochs=1), seed)
+        model.save(tmp_path / f"{name}.safetensors")
+    one, other = (tmp_path / f"{name}.safetensors" for name in ("one", "other"))
+    assert one.read_bytes() == other.read_bytes()
+
+
 def test_another_seed_gives_other_weights_and_another_split(samples):
     settings = TrainingSettings(batch_size=256, epochs=1)
     one, two = (train_model("dense", *samples, "8", settings, seed=seed) for seed in (1, 2))
