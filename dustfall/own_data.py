@@ -34,11 +34,12 @@ OPTIONAL = ("volume_fraction", "reynolds", "weight")
 def shape(path: str | PathLike) -> tuple[int, int]:
     """Numbers of scenes and of neighbours in a file, without reading all of it.
 
-    Raises FileNotFoundError, and ValueError for a file without the columns.
+    Raises FileNotFoundError, and ValueError for a file without the columns, or with rows of more
+    fields than its first line names.
     """
     path = Path(path)
     if path.suffix == ".csv":
-        number = _neighbours_of(path, _table(path, nrows=0).columns)
+        number = _neighbours_of(path, _table(path, nrows=1).columns)
         with open(path, "rb") as file:
             return sum(1 for line in file if line.strip()) - 1, number
     with _opened(path) as file:
@@ -104,6 +105,13 @@ def _table(path: Path, nrows: int | None = None) -> pd.DataFrame:
         raise FileNotFoundError(f"there is no file {path}") from None
     except ValueError as error:
         raise ValueError(f"{path} is no table: {error}") from None
+    if not isinstance(table.index, pd.RangeIndex):
+        # The first ones name the rows to pandas, and the others stand under the wrong columns.
+        more = table.index.nlevels
+        raise ValueError(
+            f"{path} names {len(table.columns)} columns, but its rows have "
+            f"{len(table.columns) + more} fields: one for each name is needed"
+        )
     names = []
     for label in map(str, table.columns):
         name, _, found = label.partition(" [")

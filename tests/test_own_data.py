@@ -123,6 +123,16 @@ def test_tables_without_the_columns_are_refused(tmp_path, text, sentence):
         read_own_data(path)
 
 
+@pytest.mark.parametrize("row", ["0,1,2,3,4,5,6", "1,2,3,4,5,6,", "0,0,1,2,3,4,5,6"])
+def test_rows_of_more_fields_than_there_are_names_are_refused(tmp_path, row):
+    path = tmp_path / "data.csv"
+    path.write_text(f"x1,y1,z1,force_x,force_y,force_z\n{row}\n{row}\n")
+    sentence = rf"data\.csv names 6 columns, but its rows have {row.count(',') + 1} fields"
+    for look in (shape, read_own_data):
+        with pytest.raises(ValueError, match=sentence):
+            look(path)
+
+
 def test_files_that_are_missing_or_something_else_are_refused(tmp_path):
     for name in ("none.csv", "none.h5"):
         for look in (shape, read_own_data):
