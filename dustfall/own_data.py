@@ -22,7 +22,8 @@ from dustfall.dataset import OWN_LAW, Dataset, check
 from dustfall.extras import extra
 from dustfall.forces.frames import check_neighbours, sort_by_distance
 from dustfall.scenes import volume_fraction
-from dustfall.spheres import checked_numbers
+from dustfall.spheres import TOUCH, checked_numbers
+from dustfall.units import CONTACT
 
 with extra("files"):
     import h5py
@@ -50,7 +51,8 @@ def read_own_data(path: str | PathLike) -> tuple[Dataset, np.ndarray | None]:
     """Read such a file: the data set, and the Reynolds numbers (m,) where it tells them.
 
     Raises FileNotFoundError, and ValueError with the file's name for a missing column, a shape that
-    does not fit, a value that is not finite or out of range, or a scene that occurs twice.
+    does not fit, a value that is not finite or out of range, a neighbour that overlaps the
+    reference sphere, or a scene that occurs twice.
     """
     path = Path(path)
     columns = _read_csv(path) if path.suffix == ".csv" else _read_hdf5(path)
@@ -69,6 +71,7 @@ def _dataset(columns: Mapping[str, np.ndarray]) -> tuple[Dataset, np.ndarray | N
         values = columns.get(name, np.ones(number))
         if values.shape != (number,) or not (np.isfinite(values) & (values > 0)).all():
             raise ValueError(f"{name} must be {number} finite values above 0, one a scene")
+    _refuse_overlaps(neighbours)
     farthest = np.linalg.norm(neighbours[:, -1], axis=1)
     dataset = Dataset(
         neighbours=neighbours,
@@ -80,6 +83,18 @@ def _dataset(columns: Mapping[str, np.ndarray]) -> tuple[Dataset, np.ndarray | N
     )
     check(dataset)
     return dataset, columns.get("reynolds")
+
+
+def _refuse_overlaps(neighbours: np.ndarray) -> None:
+    """Raise ValueError that counts the neighbours nearer than contact, which models would move."""
+    distance = np.linalg.norm(neighbours, axis=2)
+    near = distance < CONTACT - TOUCH
+    if near.any():
+        hint = "; in units of a diameter: these look like metres" if near.all() else ""
+        raise ValueError(
+            f"{near.sum()} of {near.size} neighbours overlap the reference sphere, the nearest is "
+            f"{distance.min():.3g} d_p from its centre: at least {CONTACT:g} is needed{hint}"
+        )
 
 
 def _read_csv(path: Path) -> dict[str, np.ndarray]:

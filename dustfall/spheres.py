@@ -12,6 +12,10 @@ LARGEST = 1e100
 """Largest magnitude of a coordinate [d_p] or a flow, 1 / LARGEST the smallest of a flow that is
 not zero: their squares are numbers still."""
 
+TOUCH = 1e-5
+"""How much nearer than a diameter two centres may be read to be: positions are stored in single
+precision, or in text of few digits."""
+
 MOST_RATIO = 1e3
 """Largest ratio of two radii: powers of it up to the 80th are numbers still."""
 

@@ -18,6 +18,12 @@ def columns(scenes=12, seed=1) -> dict[str, np.ndarray]:
     return {"neighbours": neighbours, "force": force, "volume_fraction": phi}
 
 
+def with_one_at(distance: float) -> np.ndarray:
+    neighbours = columns()["neighbours"]
+    neighbours[3, 2] *= distance / np.linalg.norm(neighbours[3, 2])
+    return neighbours
+
+
 def write_csv(path, values):
     k = values["neighbours"].shape[1]
     table = {
@@ -62,6 +68,12 @@ def test_neighbours_come_in_any_order(make):
     np.testing.assert_array_equal(dataset.neighbours, values["neighbours"])
 
 
+def test_neighbours_may_touch_up_to_the_digits_of_a_file(make):
+    neighbours = with_one_at(1 - 5e-6)
+    dataset, _ = read_own_data(make(columns() | {"neighbours": neighbours}))
+    np.testing.assert_array_equal(dataset.neighbours[3, 0], neighbours[3, 2])
+
+
 def test_without_a_volume_fraction_five_neighbours_have_that_of_the_paper(make):
     values = columns()
     phi = values.pop("volume_fraction")
@@ -88,6 +100,14 @@ def test_the_campaign_takes_it_as_its_own_with_weights_and_without(make, tmp_pat
         ({"volume_fraction": np.full(12, np.nan)}, "volume_fraction must be 12 finite values"),
         ({"force": np.full((12, 3), np.inf)}, "force of scene 0 of radial law own is not finite"),
         ({"neighbours": np.zeros((12, 5, 3))}, "centre of the reference sphere"),
+        (
+            {"neighbours": 25e-6 * columns()["neighbours"]},
+            "60 of 60 neighbours overlap the reference sphere, .*: these look like metres",
+        ),
+        (
+            {"neighbours": with_one_at(0.5)},
+            r"1 of 60 neighbours overlap the reference sphere, the nearest is 0\.5 .* is needed$",
+        ),
     ],
 )
 def test_values_that_cannot_be_are_refused_with_the_name_of_the_file(make, change, sentence):

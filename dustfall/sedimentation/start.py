@@ -11,7 +11,7 @@ from numba import njit
 from dustfall.sedimentation.neighbours import FARTHEST, sort_by_cell
 from dustfall.sedimentation.state import State, box_length
 from dustfall.sedimentation.trajectory import open_run
-from dustfall.spheres import checked_numbers
+from dustfall.spheres import TOUCH, checked_numbers
 from dustfall.streams import Purpose, stream
 from dustfall.suspension.cube import folded
 from dustfall.tables import Quantity, read_table
@@ -26,10 +26,6 @@ DRAWS_PER_PARTICLE = 10_000
 
 FASTEST = 100.0
 """Largest component of a velocity at the start [v_s]: no cloud's particle settles so fast."""
-
-TOUCH = 1e-5
-"""How much nearer than a diameter two centres may be read to be: positions are stored in single
-precision, or in text of few digits."""
 
 LONGEST_LINE = 1000
 """Bytes that a line of a table has at most, on average."""
