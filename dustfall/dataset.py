@@ -91,7 +91,7 @@ def aggregate(shards: Iterable[Shard], numbers: Mapping[str, int]):
     scene, and a DataFrame of all scenes with columns radial_law, scene, volume_fraction,
     converged, iterations, residual, error_estimate, minimum_gap.
     Raises ValueError if scenes are missing, occur twice, or differ between a scene file and its
-    solutions, or if `check` objects.
+    solutions, if none converged, or if `check` objects.
     """
     parts, solves = [], []
     for shard in shards:
@@ -115,13 +115,17 @@ def aggregate(shards: Iterable[Shard], numbers: Mapping[str, int]):
                 f"different; it must have each of {number} scenes once"
                 + (f" (scene {missing[0]} is missing)" if len(missing) else "")
             )
+    if not solve["converged"].any():
+        raise ValueError(f"none of {len(solve)} scenes converged: a data set needs one at least")
     dataset = joined.select(solve["converged"].to_numpy())
     check(dataset)
     return dataset, solve
 
 
 def check(dataset: Dataset) -> None:
-    """Raise ValueError unless every value is finite, neighbours are sorted and scenes differ."""
+    """Raise ValueError unless there are scenes, all finite, of sorted neighbours and different."""
+    if len(dataset) == 0:
+        raise ValueError("there is no scene: a data set needs one at least")
     for name in ("neighbours", "force", "volume_fraction"):
         values = getattr(dataset, name).reshape(len(dataset), -1)
         bad = np.flatnonzero(~np.isfinite(values).all(axis=1))

@@ -104,6 +104,13 @@ def test_unconverged_scenes_are_counted_and_left_out(tmp_path):
     assert summary(joined, solve)["unconverged"].sum() == 2
 
 
+def test_a_campaign_of_which_nothing_converged_is_refused(tmp_path):
+    data = campaign()
+    unconverged = set(zip(data.radial_law, data.scene, strict=True))
+    with pytest.raises(ValueError, match="none of 33 scenes converged"):
+        aggregate(write_shards(tmp_path, data, 10, unconverged), NUMBERS)
+
+
 def test_summary_counts_every_scene_once_in_its_decade(tmp_path):
     data = replace(campaign(), volume_fraction=np.resize([1e-8, 9.9e-8, 1e-7, 1e-5], 33))
     table = summary(*aggregate(write_shards(tmp_path, data, 6), NUMBERS))

@@ -116,6 +116,12 @@ def test_values_that_cannot_be_are_refused_with_the_name_of_the_file(make, chang
         read_own_data(path)
 
 
+def test_a_file_without_a_scene_is_refused(make):
+    path = make({name: values[:0] for name, values in columns().items()})
+    with pytest.raises(ValueError, match=rf"{path.name}: there is no scene"):
+        read_own_data(path)
+
+
 def test_what_a_prediction_writes_is_a_data_set(tmp_path):
     np.save(tmp_path / "scenes.npy", columns()["neighbours"])
     written = tmp_path / "forces.csv"
