@@ -1,6 +1,7 @@
 """How well force models predict: scores, errors near contact, broken symmetries."""
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -73,6 +74,8 @@ def training_history(model: LearnedModel, test: Dataset) -> pd.DataFrame:
     Returns the columns component, training_scenes, epoch, validation_error [(Re_p c_D)^2] and r2,
     that of the weights kept on all scenes of `test`, the same in all rows of a component.
     """
+    # Of one law, so that the first rows are those of all scenes.
+    test = replace(test, radial_law=np.full(len(test), "all"))
     whole = scores({model.name: model.predict(test.neighbours)}, test)
     reached = whole.drop_duplicates("component").set_index("component")["r2"]
     return pd.concat(

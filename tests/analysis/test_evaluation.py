@@ -47,17 +47,17 @@ def test_scores_count_each_scene_once_in_its_decade(test_scenes):
     assert one["samples"].tolist()[0] == sum(one["samples"].tolist()[1:])
 
 
-def test_a_training_is_told_with_what_its_kept_weights_reach(models, test_scenes):
-    model = models["idnn"]
-    table = training_history(model, test_scenes.of_laws(["uniform"])).set_index("component")
+@pytest.mark.parametrize("laws", [["uniform"], ["uniform", "ball"]])
+def test_a_training_is_told_with_what_its_kept_weights_reach(models, test_scenes, laws):
+    model, test = models["idnn"], test_scenes.of_laws(laws)
+    table = training_history(model, test).set_index("component")
     for component, history in model.history.items():
         own = table.loc[component]
         assert own["epoch"].tolist() == history.epochs == [5, 10, 15, 20, 25]
         assert own["validation_error"].tolist() == history.validation_error
         assert own["r2"].nunique() == 1
-    uniform = test_scenes.of_laws(["uniform"])
-    force = model.predict(uniform.neighbours)[:, 1]
-    unexplained = ((force - uniform.force[:, 1]) ** 2).mean() / uniform.force[:, 1].var()
+    force = model.predict(test.neighbours)[:, 1]
+    unexplained = ((force - test.force[:, 1]) ** 2).mean() / test.force[:, 1].var()
     assert table.loc["streamwise", "r2"].iloc[0] == pytest.approx(1 - unexplained)
 
 
