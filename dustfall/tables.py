@@ -5,11 +5,14 @@ be left out: then all columns have to be there, in order. The first quantity of 
 rows are about: its components are x, y, z, and of several vectors x1, y1, z1, x2, and so on; those
 of others carry their name, as in force_x. Units follow a name in brackets, `force_x [Re_p c_D]`,
 and are checked where they are given. An npy file holds the first quantity alone, all columns side
-by side, or a structured array; HDF5 a dataset for each quantity.
+by side, or a structured array; HDF5 a dataset for each quantity. Others than those asked for are
+left alone, so that one command reads what another wrote, unless their names look misspelt.
 """
 
+import difflib
+import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from os import PathLike
 from pathlib import Path
 from typing import NamedTuple
@@ -20,6 +23,9 @@ from dustfall.extras import extra
 from dustfall.files import atomic
 
 SUFFIXES = (".csv", ".txt", ".npy", ".h5")
+
+ALIKE = 0.75
+"""Likeness, as difflib has it, from which on a name is taken for another one misspelt."""
 
 
 class Quantity(NamedTuple):
@@ -42,8 +48,8 @@ def read_table(path: str | PathLike, quantities: Quantities) -> dict[str, np.nda
     """Read quantities as float64 arrays (rows, *shape); those not required may be missing.
 
     Raises FileNotFoundError where there is no file, and ValueError, with its name, for a file of
-    another kind, a quantity that is missing, of another shape or in other units, and an empty
-    table. Values that are not finite are left to who uses them.
+    another kind, a quantity that is missing, misnamed, of another shape or in other units, and an
+    empty table. Values that are not finite are left to who uses them.
     """
     path = Path(path)
     if not path.is_file():
@@ -145,7 +151,7 @@ def _is_number(text: str) -> bool:
 
 
 def _named(head: list[str], rows: np.ndarray, quantities: Quantities) -> dict[str, np.ndarray]:
-    """Pick quantities from the columns by name; columns that nobody asks for are left."""
+    """Pick quantities from the columns by name; columns that nobody asks for are left alone."""
     units = {}
     for label in head:
         name, _, unit = label.partition("[")
@@ -154,6 +160,7 @@ def _named(head: list[str], rows: np.ndarray, quantities: Quantities) -> dict[st
         units[name.strip()] = unit.strip().removesuffix("]").strip()
     place = {name: k for k, name in enumerate(units)}
     found = {}
+    taken: list[str] = []
     for number, (name, quantity) in enumerate(quantities.items()):
         shape = quantity.shape
         count = 0
@@ -170,7 +177,38 @@ def _named(head: list[str], rows: np.ndarray, quantities: Quantities) -> dict[st
             if units[label] not in ("", quantity.units):
                 raise ValueError(f"{label} is in {units[label]}: {quantity.units} is needed")
         found[name] = rows[:, [place[label] for label in labels]].reshape(len(rows), *whole)
+        taken += labels
+    left = [label for label in place if label not in taken]
+    for label in left:
+        if re.fullmatch(r"[xyz]\d+", label, re.IGNORECASE):
+            raise ValueError(
+                f"there is a column {label} beside {', '.join(taken)}: several vectors are "
+                "numbered x1, y1, z1, x2, and so on, without a gap"
+            )
+    _refuse_misspelt(left, found, quantities, text=True)
     return found
+
+
+def _refuse_misspelt(
+    left: list[str], found: Container[str], quantities: Quantities, text: bool
+) -> None:
+    """Raise ValueError for a name that is left and looks like that of a quantity not found.
+
+    As v_x for velocity_x does, or weights for weight; text has a name for each component.
+    """
+    for quantity, (shape, _, _, required) in quantities.items():
+        if required or quantity in found:
+            continue
+        whole = tuple(1 if size is None else size for size in shape)
+        labels = _labels(quantity, whole, first=False) if text else [quantity]
+        for name in left:
+            letters = re.sub("_?[xyz]$", "", name.lower()) if shape else ""
+            short = letters != "" and quantity.startswith(letters)
+            if short or difflib.get_close_matches(name.lower(), labels, 1, ALIKE):
+                raise ValueError(
+                    f"there is a column {name}, but no {quantity}: if it is that, "
+                    f"{', '.join(labels)} is needed, else a name less alike"
+                )
 
 
 def _unnamed(rows: np.ndarray, quantities: Quantities) -> dict[str, np.ndarray]:
@@ -202,7 +240,10 @@ def _read_npy(path: Path, quantities: Quantities) -> dict[str, np.ndarray]:
     # Mapped first: what claims to be longer than its file is refused, and takes no memory.
     array = np.array(np.load(path, mmap_mode="r", allow_pickle=False))
     if array.dtype.names:
-        return {name: array[name] for name in quantities if name in array.dtype.names}
+        found = {name: array[name] for name in quantities if name in array.dtype.names}
+        left = [name for name in array.dtype.names if name not in quantities]
+        _refuse_misspelt(left, found, quantities, text=False)
+        return found
     if array.ndim == 3:
         return {next(iter(quantities)): array}
     if array.ndim != 2:
@@ -218,6 +259,8 @@ def _read_hdf5(path: Path, quantities: Quantities) -> dict[str, np.ndarray]:
 
     found, summed = {}, []
     with h5py.File(path) as file:
+        left = [name for name in file if name not in quantities]
+        _refuse_misspelt(left, set(file), quantities, text=False)
         for name, quantity in quantities.items():
             if name not in file:
                 continue

@@ -71,6 +71,30 @@ def test_plain_arrays_and_datasets_of_others_are_read(tmp_path):
     )
 
 
+START = {"position": Quantity((3,), "d_p", ""), "velocity": Quantity((3,), "v_s", "", False)}
+
+
+@pytest.mark.parametrize("names", ["v_x,v_y,v_z", "vx,vy,vz", "Vel_x,Vel_y,Vel_z", "velocity,s,t"])
+def test_an_optional_quantity_of_another_name_is_not_passed_over(tmp_path, names):
+    (tmp_path / "start.csv").write_text(f"x,y,z,{names}\n1,2,3,4,5,6\n")
+    told = "but no velocity: if it is that, velocity_x, velocity_y, velocity_z is needed"
+    with pytest.raises(ValueError, match=rf"start\.csv: there is a column {names[:2]}.*, {told}"):
+        read_table(tmp_path / "start.csv", START)
+
+
+@pytest.mark.parametrize("suffix", ["csv", "npy", "h5"])
+def test_what_one_table_holds_is_read_as_another_that_needs_less_of_it(tmp_path, suffix):
+    more = {
+        "position": START["position"],
+        "force": Quantity((3,), "Re_p c_D", "force"),
+        "error_estimate": Quantity((), "1", "error"),
+    }
+    values = {"position": VALUES["force"], "force": VALUES["force"]}
+    values["error_estimate"] = VALUES["weight"]
+    write_table(tmp_path / f"table.{suffix}", more, values)
+    assert list(read_table(tmp_path / f"table.{suffix}", START)) == ["position"]
+
+
 BAD_TEXT = {
     "": "the table is empty",
     "# nothing\n": "the table is empty",
@@ -78,6 +102,9 @@ BAD_TEXT = {
     "x1,y1,z1,force_x,force_y\n1,2,3,4,5\n": "no column force_z among x1, y1, z1, force_x",
     "x1,y1,z1,force_x,force_y,force_z,weight_x\n1,2,3,4,5,6\n": "7 names for 6 columns",
     "x1,y1,z1,x2,force_x,force_y,force_z\n1,2,3,4,5,6,7\n": "no column y2",
+    "x1,y1,z1,x3,y3,z3,force_x,force_y,force_z\n1,2,3,4,5,6,7,8,9\n": "column x3 beside x1, y1, z1",
+    "x1,y1,z1,X2,Y2,Z2,force_x,force_y,force_z\n1,2,3,4,5,6,7,8,9\n": "column X2 beside x1, y1, z1",
+    "x1,y1,z1,force_x,force_y,force_z,weights\n1,2,3,4,5,6,7\n": "column weights, but no weight: ",
     "x1,x1\n1,2\n": "two columns x1",
     "x1 [mm],y1,z1,force_x,force_y,force_z\n1,2,3,4,5,6\n": r"x1 is in mm: d_p is needed",
     "x1,y1,z1,force_x,force_y,force_z\n1,2,3,4,5,six\n": "could not convert string 'six'",
@@ -112,8 +139,15 @@ BAD_FILES = [
     ("line.npy", write_npy, np.zeros(6), r"an array \(6,\) is not"),
     ("empty.npy", write_npy, np.zeros((0, 6)), "the table is empty"),
     ("names.npy", write_npy, np.zeros(2, [("neighbours", "f8", (5, 3))]), "there is no force"),
+    (
+        "weights.npy",
+        write_npy,
+        np.zeros(2, [("neighbours", "f8", (5, 3)), ("force", "f8", 3), ("weights", "f8")]),
+        "there is a column weights, but no weight: if it is that, weight is needed",
+    ),
     ("text.npy", write_npy, np.full((2, 6), "a"), "could not convert"),
     ("lacking.h5", write_hdf5, {"neighbours": None}, "there is no neighbours"),
+    ("misspelt.h5", write_hdf5, {"weight": None, "weigth": np.ones(7)}, "weigth, but no weight: "),
     ("short.h5", write_hdf5, {"force": np.zeros((6, 3))}, "different lengths"),
     ("flat.h5", write_hdf5, {"neighbours": np.zeros((7, 12))}, r"\(7, 12\), not \(rows, k, 3\)"),
     ("metres.h5", write_hdf5, {"units": "N"}, "force is in N: Re_p c_D is needed"),
