@@ -198,6 +198,8 @@ def load_model(path=None) -> LearnedModel:
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
     except (SafetensorError, ValueError, RecursionError) as error:
         raise ValueError(f"{path} is damaged or no safetensors file: {error}") from error
+    except (AttributeError, TypeError) as error:
+        raise ValueError(f"{path} holds numbers of a type that NumPy has not: {error}") from error
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise ValueError(f"{path} is a safetensors file, but holds no {FORMAT}")
     if header.get("version") != VERSION:

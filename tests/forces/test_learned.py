@@ -7,6 +7,7 @@ import pytest
 import torch
 from safetensors import safe_open
 from safetensors.numpy import save_file
+from safetensors.torch import save_file as save_torch
 
 from dustfall.forces import learned, load_model
 from dustfall.forces.features import COMPONENTS, describe
@@ -213,6 +214,14 @@ def test_files_that_hold_something_else_are_refused(tmp_path):
     path = tmp_path / "other.safetensors"
     save_file({"a": np.zeros(3)}, path)
     with pytest.raises(ValueError, match="holds no dustfall force model"):
+        load_model(path)
+
+
+@pytest.mark.parametrize("kind", [torch.bfloat16, torch.float8_e4m3fn, torch.float8_e5m2])
+def test_numbers_of_a_type_that_numpy_lacks_are_refused(tmp_path, kind):
+    path = tmp_path / "other.safetensors"
+    save_torch({"a": torch.zeros(3, dtype=kind)}, path)
+    with pytest.raises(ValueError, match=r"other\.safetensors holds numbers of a type"):
         load_model(path)
 
 
