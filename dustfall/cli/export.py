@@ -55,7 +55,6 @@ def run(options) -> None:
 def _export_model(options) -> None:
     from dustfall.forces import Formula
     from dustfall.forces.export import export_json, export_onnx, export_openfoam
-    from dustfall.forces.frames import MOST_NEIGHBOURS
     from dustfall.units import NEIGHBOURS
 
     model = models.named_model(options.source)
@@ -68,8 +67,6 @@ def _export_model(options) -> None:
     number = NEIGHBOURS if options.neighbours is None else options.neighbours
     if not isinstance(model, Formula) and options.neighbours not in (None, model.neighbours):
         raise ValueError(f"{options.neighbours} neighbours: the model takes {model.neighbours}")
-    if not 1 <= number <= MOST_NEIGHBOURS:
-        raise ValueError(f"{number} neighbours: allowed are 1 to {MOST_NEIGHBOURS}")
     export(model, options.output, number)
 
 

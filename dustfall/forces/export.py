@@ -17,6 +17,7 @@ from dustfall.files import atomic
 from dustfall.forces.features import FADING, KINDS
 from dustfall.forces.formula import Formula
 from dustfall.forces.formulas.reflections import REFLECTIONS, pair_correction
+from dustfall.forces.frames import MOST_NEIGHBOURS
 from dustfall.forces.learned import ACTIVATION, LearnedModel, Network
 from dustfall.streams import Purpose, stream
 from dustfall.units import COMPONENTS, CONTACT, NEIGHBOURS
@@ -33,8 +34,9 @@ IR_VERSION = 8
 
 def export_json(model: LearnedModel | Formula, path, neighbours: int = NEIGHBOURS) -> None:
     """Write a whole force model to `path` as JSON; see `exported` for the entries."""
+    document = json.dumps(exported(model, neighbours), indent=1)
     with atomic(path) as temporary:
-        temporary.write_text(json.dumps(exported(model, neighbours), indent=1) + "\n")
+        temporary.write_text(document + "\n")
 
 
 def export_openfoam(model: LearnedModel | Formula, path, neighbours: int = NEIGHBOURS) -> None:
@@ -65,12 +67,15 @@ def exported(model: LearnedModel | Formula, neighbours: int = NEIGHBOURS) -> dic
     - `test_scenes` (m, k, 3) and `test_forces` (m, 3), which a reader has to reproduce
     - `checksum`: CRC-32 of all entries in this order, texts as bytes, numbers as doubles
 
-    Raises ValueError for a formula that the readers do not know.
+    Raises ValueError for a formula that the readers do not know, or that takes no such number of
+    neighbours.
     """
     if isinstance(model, LearnedModel):
         neighbours, entries = model.neighbours, _learned(model)
-    else:
+    elif isinstance(neighbours, int) and 1 <= neighbours <= MOST_NEIGHBOURS:
         entries = _formula(model.name)
+    else:
+        raise ValueError(f"{neighbours!r} neighbours: allowed are 1 to {MOST_NEIGHBOURS}")
     scenes = _test_scenes(neighbours)
     document = {
         "format": FORMAT,

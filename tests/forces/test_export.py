@@ -3,16 +3,24 @@ import json
 import numpy as np
 import pytest
 
+from dustfall.forces import FORMULAS
+from dustfall.forces.export import export_json, export_onnx, export_openfoam
 from dustfall.forces.features import describe
 from tests.forces.scenes import random_neighbours
 
 onnxruntime = pytest.importorskip("onnxruntime")
 
 
+@pytest.mark.parametrize("number", [0, -1, 51, 2.5, "5"])
+def test_a_formula_is_exported_for_neighbours_that_it_takes(tmp_path, number):
+    for export in (export_json, export_openfoam):
+        with pytest.raises(ValueError, match=f"{number!r} neighbours: allowed are 1 to 50"):
+            export(FORMULAS["isolated"], tmp_path / "model", number)
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("kind", ["dense", "pairwise", "idnn", "anchored"])
 def test_the_graph_gives_the_numbers_of_the_networks(models, kind, tmp_path):
-    from dustfall.forces.export import export_onnx
-
     model = models[kind]
     path = tmp_path / "model.onnx"
     export_onnx(model, path)
