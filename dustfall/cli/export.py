@@ -58,6 +58,8 @@ def _export_model(options) -> None:
     from dustfall.units import NEIGHBOURS
 
     model = models.named_model(options.source)
+    if not isinstance(model, Formula) and options.neighbours not in (None, model.neighbours):
+        raise ValueError(f"{options.neighbours} neighbours: the model takes {model.neighbours}")
     if options.to == "onnx":
         if isinstance(model, Formula):
             raise ValueError(f"{model.name} has no networks that ONNX could hold")
@@ -65,8 +67,6 @@ def _export_model(options) -> None:
         return
     export = export_openfoam if options.to == "openfoam" else export_json
     number = NEIGHBOURS if options.neighbours is None else options.neighbours
-    if not isinstance(model, Formula) and options.neighbours not in (None, model.neighbours):
-        raise ValueError(f"{options.neighbours} neighbours: the model takes {model.neighbours}")
     export(model, options.output, number)
 
 

@@ -199,6 +199,7 @@ ERRORS = {
     "export anchored --to vtkhdf -o {0}/x": "anchored is written as openfoam, json, onnx",
     "export isolated --to json --neighbours 0 -o {0}/x": "0 neighbours: allowed are 1 to 50",
     "export anchored --to json --neighbours 3 -o {0}/x": "3 neighbours: the model takes 5",
+    "export anchored --to onnx --neighbours 7 -o {0}/x": "7 neighbours: the model takes 5",
     "export run.nc --to json -o {0}/x": "run.nc is written as vtkhdf",
     "export isolated --to onnx -o {0}/x": "isolated has no networks",
     "export anchored --to json --units si -o {0}/x": "--units means nothing to the format json",
