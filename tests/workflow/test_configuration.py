@@ -11,6 +11,7 @@ from dustfall.analysis import spectra
 from dustfall.analysis.correlations import coefficient_of_determination, spearman_by_neighbours
 from dustfall.forces.registry import trained_models
 from dustfall.scenes import LAWS, MOST_PLACED
+from dustfall.streams import Purpose, stream
 from tests.forces.scenes import random_neighbours
 from workflow import configuration
 from workflow.configuration import ConfigurationError, configure, keys, load_schema, read_file
@@ -210,6 +211,11 @@ REFUSED = [
     ("sedimentation.start_file", "start.nc", "one file for 18 clouds of different numbers of"),
     ("idnn.layers", ["99999999999/10"], 'idnn.layers[0] is "99999999999/10", but must be hidden'),
     ("scenes.number", {"ball": 0}, "idnn.laws_of.anchored names ball, but must name laws that"),
+    (
+        "seed",
+        2**32,
+        "seed is 4294967296, but must be a whole number at least 0 and at most 4294967295",
+    ),
     ("seed", 10**400, "seed is a number of very many digits, but must be a whole number"),
     ("seed", 1e300, "seed is 1e+300, but must be a whole number at least 0 and at most"),
     ("figures.fit_frequencies", [1], "figures.fit_frequencies is [1.0], but must be two numbers"),
@@ -256,6 +262,13 @@ def test_a_cloud_in_which_all_feel_each_other_may_have_few_particles():
 
 def test_scenes_have_as_many_neighbours_as_find_room():
     assert keys(load_schema())["scenes.neighbours"]["maximum"] == MOST_PLACED
+
+
+def test_a_seed_is_one_that_random_streams_take():
+    largest = keys(load_schema())["seed"]["maximum"]
+    stream(Purpose.SCENE, configure({"seed": largest})["seed"])
+    with pytest.raises(ValueError, match="seed and items"):
+        stream(Purpose.SCENE, largest + 1)
 
 
 def test_figures_need_scenes_of_their_law():
