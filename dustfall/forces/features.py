@@ -138,10 +138,11 @@ def describe(kind: str, neighbours: np.ndarray, radial_input: str, largest: floa
 
     `radial_input` is what spherical coordinates give for the distance: itself ("distance") or its
     natural logarithm. `largest` is the largest distance trained on: the networks see neighbours
-    beyond it there. The outputs fade, so that a reference sphere whose neighbours all move away
-    goes over into Stokes drag: with spherical coordinates as 1/distance of the nearest neighbour,
-    from `largest` on; with unit vectors each block input as 1/distance of its (nearest) neighbour,
-    on the reflections, whose error falls sooner, as its fourth power.
+    beyond it there; with unit vectors log r is held there, and 1/r is not. The outputs fade, so
+    that a reference sphere whose neighbours all move away goes over into Stokes drag: with
+    spherical coordinates as 1/distance of the nearest neighbour, from `largest` on; with unit
+    vectors each block input as 1/distance of its (nearest) neighbour, on the reflections, whose
+    error falls sooner, as its fourth power.
     """
     layout = KINDS[kind]
     if layout.ordered:

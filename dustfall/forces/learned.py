@@ -131,8 +131,9 @@ class LearnedModel:
     `history` holds, for a model just trained, the epochs and validation errors of each component.
 
     Out of range: a neighbour closer than contact is held at contact. Neighbours further away than
-    any in training are seen by the networks at that distance, and what the networks add fades
-    with distance, so that the force goes over into Stokes drag (see `features.describe`).
+    any in training are seen by the networks at that distance, but for 1/r, which goes with unit
+    vectors and is seen as it is. What the networks add fades with distance, so that the force goes
+    over into Stokes drag (see `features.describe`).
     """
 
     def __init__(self, header: dict, networks: dict[str, Network], history: dict | None = None):
