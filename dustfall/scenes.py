@@ -9,7 +9,8 @@ from dustfall.units import NEIGHBOURS, SPHERE_VOLUME
 LAWS = ("uniform", "ball", "contact")
 """Radial laws: `uniform`, radii uniform between contact and the farthest neighbour (the law that
 comes nearest to the paper's statistics); `ball`, points uniform in the ball (a dilute random
-suspension); `contact`, as `uniform`, but one neighbour nearly touches the reference sphere."""
+suspension); `contact`, as `uniform`, but one neighbour nearly touches the reference sphere, and
+another one is the farthest."""
 
 NEAR_CONTACT = (1e-3, 0.1)
 """Gap [d_p] of the nearly touching neighbour of the law `contact`, uniform in this range: scenes
@@ -69,8 +70,9 @@ def random_scene(
     """
     if law not in LAWS:
         raise ValueError(f"radial law {law!r}: allowed are {', '.join(LAWS)}")
-    if not 1 <= neighbours <= MOST_PLACED:
-        raise ValueError(f"{neighbours} neighbours: allowed are 1 to {MOST_PLACED}")
+    fewest = 2 if law == "contact" else 1
+    if not fewest <= neighbours <= MOST_PLACED:
+        raise ValueError(f"{neighbours} neighbours: allowed are {fewest} to {MOST_PLACED}")
     low, high = phi_range
     if not 0.0 < low <= high <= densest(neighbours):
         raise ValueError(

@@ -77,6 +77,9 @@ def test_impossible_scenes_are_refused():
         random_scene(1, "cube", 0, RANGE)
     with pytest.raises(ValueError, match="21 neighbours: allowed are 1 to 20"):
         random_scene(1, "ball", 0, RANGE, 21)
+    with pytest.raises(ValueError, match="1 neighbours: allowed are 2 to 20"):
+        random_scene(1, "contact", 0, RANGE, 1)
+    assert random_scene(1, "uniform", 0, RANGE, 1)[0].shape == (1, 3)
     for bad in ((1e-3, 1e-8), (0.0, 1e-3), (1e-8, 0.5)):
         with pytest.raises(ValueError, match="phi range"):
             random_scene(1, "ball", 0, bad)
