@@ -21,11 +21,6 @@ FARTHEST = 3.0
 """Outermost radius, in mean spacings: some hundred neighbours; half the side of the cube bounds it
 where that is smaller."""
 
-RANDOM_SHARE = NEIGHBOURS / (NEIGHBOURS - 1)
-"""Mean over random points of the volume fraction that the distance to the fifth neighbour tells,
-over that of the bulk: 5 V / (4 pi d_5^3 / 3), and the volume of that ball has a gamma law of shape
-five, whose inverse has the mean 1/4 in spacings: a biased estimate."""
-
 
 def pair_distribution(positions, length: float, edges) -> tuple[np.ndarray, np.ndarray]:
     """Pairs of points by their distance, over those of random points, and how upright they stand.
@@ -100,7 +95,9 @@ def local_volume_fraction(positions, length: float) -> np.ndarray:
     """Volume fraction (n,) around each particle by its fifth neighbour, as the paper takes it.
 
     `scenes.volume_fraction` of the distance to the fifth neighbour (paper, section "Mineral dust
-    sedimentation"). Over random points its mean is `RANDOM_SHARE` times the bulk's.
+    sedimentation"). A biased estimate: over random points its mean is 5/4 of the bulk's, as the
+    volume of the ball that reaches to the fifth has a gamma law of shape five, whose inverse has
+    the mean 1/4 in spacings.
     """
     vectors, _ = nearest_neighbours(positions, length, NEIGHBOURS)
     farthest = np.linalg.norm(vectors[:, -1], axis=1)

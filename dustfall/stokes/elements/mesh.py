@@ -45,13 +45,6 @@ class SphereMesh:
         edges, numbers = np.unique(sides, axis=0, return_inverse=True)
         return edges, numbers.reshape(-1, 3)
 
-    def solid_angles(self) -> np.ndarray:
-        """(n_triangles,) solid angle of each element [sr] (van Oosterom and Strackee 1983)."""
-        a, b, c = (self.vertices[self.triangles[:, k]] for k in range(3))
-        triple = np.einsum("ij,ij->i", a, np.cross(b, c))
-        dots = sum(np.einsum("ij,ij->i", p, q) for p, q in ((a, b), (b, c), (c, a)))
-        return 2.0 * np.arctan2(triple, 1.0 + dots)
-
 
 GROWTH = 0.5
 """Edge length gained per distance from the point that a graded mesh refines towards."""
