@@ -19,7 +19,7 @@ from dustfall.files import remove_leftovers
 from dustfall.sedimentation import checkpoint as checkpoints
 from dustfall.sedimentation.neighbours import FARTHEST
 from dustfall.sedimentation.properties import Properties
-from dustfall.sedimentation.state import Closure, Drag, State, check_step, move
+from dustfall.sedimentation.state import Closure, Drag, State, check_closure, move
 from dustfall.sedimentation.trajectory import (
     SERIES,
     TRACKED,
@@ -146,12 +146,18 @@ def settle(
     Raises
     ------
     ValueError : the checkpoint is of a run with other settings, or another run is at work on it;
-        the closure is made for another step; or the flow is no Stokes flow (see
-        `Properties.check_stokes_flow`).
+        the closure is made for another step, other properties or another volume fraction; or the
+        flow is no Stokes flow (see `Properties.check_stokes_flow`).
     FloatingPointError : the drag is not finite, or a particle has flown off.
     SystemExit : SIGTERM or Ctrl-C came, and the state was saved.
     """
-    check_step(closure, schedule.step)
+    check_closure(
+        closure,
+        schedule.step,
+        properties.stokes_number,
+        start.volume_fraction,
+        None if closure.viscosity is None else properties.stokes_number / properties.galileo,
+    )
     properties.check_stokes_flow()
     tracked = output.tracked(len(start.position))
     settings = {

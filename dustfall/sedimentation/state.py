@@ -15,6 +15,7 @@ since m / (3 pi eta d_p) = tau: buoyancy is inside v_s and the factor of gravity
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import isclose
 from typing import ClassVar
 
 import numpy as np
@@ -25,6 +26,9 @@ from dustfall.units import SPHERE_VOLUME
 
 SERIES_BELOW = 0.05
 """Where `beta * step` is smaller, the differences of exponentials come from their series."""
+
+SAME = 1e-9
+"""Relative difference up to which two numbers are one that was computed in two ways."""
 
 SERIES_TERMS = 10
 """Terms of that series: the first one left out is below 1e-16 of the sum."""
@@ -88,6 +92,15 @@ class Closure(ABC):
     step: float | None = None
     """Step [tau] that it is made for; None where any will do."""
 
+    stokes_number: float | None = None
+    """v_s tau / d_p that it is made for; None where any will do."""
+
+    viscosity: float | None = None
+    """Kinematic, of the fluid that it is made for [d_p^2 / tau]; None where any will do."""
+
+    volume_fraction: float | None = None
+    """Of the cloud that it is made for; None where any will do."""
+
     @abstractmethod
     def __call__(self, state: State) -> Drag:
         """Return the drag on all particles. Called once for each step, one after the other."""
@@ -116,16 +129,33 @@ class Closure(ABC):
 def step(state: State, closure: Closure, size: float, stokes_number: float) -> State:
     """Take one step of `size` [tau]; stokes_number is v_s tau / d_p.
 
-    Raises ValueError for a closure that is made for another step.
+    Raises ValueError for a closure that is made for another step, Stokes number or volume fraction.
     """
-    check_step(closure, size)
+    check_closure(closure, size, stokes_number, state.volume_fraction)
     return move(state, closure(state), size, stokes_number)
 
 
-def check_step(closure: Closure, size: float) -> None:
-    """Raise ValueError unless the closure is made for steps of `size` [tau]."""
+def check_closure(
+    closure: Closure,
+    size: float,
+    stokes_number: float,
+    volume_fraction: float,
+    viscosity: float | None = None,
+) -> None:
+    """Raise ValueError unless the closure is made for such a run.
+
+    size: of a step [tau]. stokes_number: v_s tau / d_p. viscosity: kinematic, of the fluid
+    [d_p^2 / tau], as far as it is known.
+    """
     if closure.step not in (None, size):
         raise ValueError(f"{closure.name} is made for a step of {closure.step} tau, not {size}")
+    for name, own, given in (
+        ("Stokes number v_s tau / d_p", closure.stokes_number, stokes_number),
+        ("volume fraction phi", closure.volume_fraction, volume_fraction),
+        ("kinematic viscosity in d_p^2 / tau", closure.viscosity, viscosity),
+    ):
+        if own is not None and given is not None and not isclose(own, given, rel_tol=SAME):
+            raise ValueError(f"{closure.name} is made for a {name} of {own}, not {given}")
 
 
 def move(state: State, drag: Drag, size: float, stokes_number: float) -> State:

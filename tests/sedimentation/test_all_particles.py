@@ -22,7 +22,7 @@ STEP = 0.1
 
 def taken(state, closure, steps, size=STEP):
     for _ in range(steps):
-        state = step(state, closure, size, STOKES)
+        state = step(state, closure, size, closure.stokes_number)
     return state
 
 

@@ -2,6 +2,7 @@ import os
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from itertools import pairwise
 from multiprocessing import get_context
 from pathlib import Path
@@ -14,7 +15,14 @@ from scipy.spatial import cKDTree
 
 from dustfall.forces.formulas.isolated import MODEL as ISOLATED
 from dustfall.forces.formulas.rotne_prager import MODEL as ROTNE_PRAGER
-from dustfall.sedimentation import Properties, box_length, random_positions
+from dustfall.sedimentation import (
+    AllParticles,
+    BackFlow,
+    MovingNeighbours,
+    Properties,
+    box_length,
+    random_positions,
+)
 from dustfall.sedimentation.neighbour_list import REORDERED_EVERY
 from tests.sedimentation.runs import DUST, run
 
@@ -485,6 +493,32 @@ def test_checkpoint_of_other_settings_is_refused_by_name(tmp_path, change, named
         run(tmp_path, checkpoint=checkpoint, checkpoint_interval=0.0, progress=interrupt_at(3))
     with pytest.raises(ValueError, match=named):
         run(tmp_path, **{"checkpoint": checkpoint} | change)
+
+
+HEAVIER = DUST.with_galileo_multiple(4)
+
+# Twice the fluid's density, the same settling velocity and response time.
+DENSER = replace(
+    DUST,
+    fluid_density=2 * DUST.fluid_density,
+    gravity=DUST.gravity
+    * (DUST.particle_density - DUST.fluid_density)
+    / (DUST.particle_density - 2 * DUST.fluid_density),
+)
+
+
+@pytest.mark.parametrize(
+    ("closure", "change", "told"),
+    [
+        (lambda: AllParticles(DUST, 0.1), {"properties": HEAVIER}, "all_particles .* Stokes"),
+        (lambda: AllParticles(DUST, 0.1), {"properties": DENSER}, "all_particles .* viscosity"),
+        (lambda: MovingNeighbours(DUST, 0.1), {"properties": HEAVIER}, "moving_.* Stokes number"),
+        (lambda: BackFlow(ISOLATED, 1e-3), {"volume_fraction": 1e-5}, "back_flow .* fraction phi"),
+    ],
+)
+def test_a_run_refuses_a_closure_that_is_made_for_another(tmp_path, closure, change, told):
+    with pytest.raises(ValueError, match=told):
+        run(tmp_path, closure=closure(), **change)
 
 
 def test_a_failed_run_leaves_nothing_behind(tmp_path):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from dustfall.sedimentation import Closure, Drag, State, move, step
+from dustfall.sedimentation.state import check_closure
 
 RNG = np.random.default_rng(7)
 
@@ -50,3 +51,29 @@ def test_a_closure_made_for_another_step_is_refused():
     with pytest.raises(ValueError, match=r"yearly is made for a step of 365\.0 tau, not 0\.1"):
         step(state, Yearly(), 0.1, 9.0)
     assert step(state, Yearly(), 365.0, 9.0).steps == 1
+
+
+@pytest.mark.parametrize(
+    ("made_for", "told"),
+    [
+        ({"stokes_number": 8.0}, r"Stokes number v_s tau / d_p of 8\.0, not 9\.0"),
+        ({"volume_fraction": 1e-5}, r"volume fraction phi of 1e-05, not 0\.001"),
+        ({"viscosity": 2.0}, r"kinematic viscosity in d_p\^2 / tau of 2\.0, not 1\.0"),
+    ],
+)
+def test_a_closure_made_for_another_cloud_or_fluid_is_refused(made_for, told):
+    class Particular(Closure):
+        name = "particular"
+
+        def __call__(self, state):
+            return Drag(np.ones(1), np.zeros((1, 3)))
+
+    closure = Particular()
+    check_closure(closure, 0.1, 9.0, 1e-3, 1.0)
+    vars(closure).update(made_for)
+    with pytest.raises(ValueError, match=f"particular is made for a {told}"):
+        check_closure(closure, 0.1, 9.0, 1e-3, 1.0)
+    if "viscosity" not in made_for:
+        state = State(np.zeros((1, 3)), np.zeros((1, 3)), 1e-3)
+        with pytest.raises(ValueError, match=told):
+            step(state, closure, 0.1, 9.0)

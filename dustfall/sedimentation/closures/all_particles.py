@@ -82,6 +82,8 @@ class AllParticles(Closure):
 
     name = ALL_PARTICLES
     step: float
+    stokes_number: float
+    viscosity: float
     series: ClassVar = {
         "products": Column("1", "products with the mobility that the step took"),
         "stopped": Column("1", "pairs stopped because they would touch"),

@@ -38,7 +38,7 @@ class BackFlow(NearestNeighbours):
     Parameters
     ----------
     model, neighbours, threads : as of `NearestNeighbours`
-    volume_fraction : of the suspension, whose random mean is repaired
+    volume_fraction : of the suspension, whose random mean is repaired, and of the run
 
     Raises
     ------
@@ -52,6 +52,7 @@ class BackFlow(NearestNeighbours):
         self, model, volume_fraction: float, neighbours: int | None = None, threads: int = 1
     ):
         super().__init__(model, neighbours, threads)
+        self.volume_fraction = volume_fraction
         suspension = 1.0 + BATCHELOR_COEFFICIENT * volume_fraction
         self.velocity = random_mean(model, volume_fraction, self.neighbours) - suspension
 

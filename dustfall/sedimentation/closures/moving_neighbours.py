@@ -46,6 +46,7 @@ class MovingNeighbours(NearestNeighbours):
 
     name = "moving_neighbours"
     step: float
+    stokes_number: float
     series: ClassVar = {
         **{
             name: NearestNeighbours.series[name]

@@ -67,7 +67,9 @@ def test_two_that_would_touch_are_stopped():
 
 def test_threads_change_no_bit():
     state = random_start(300, 1e-2, seed=3)
-    one, two = (step(state, MovingNeighbours(DUST, 0.1, threads=t), 0.1, 9.0) for t in (1, 2))
+    one, two = (
+        step(state, MovingNeighbours(DUST, 0.1, threads=t), 0.1, DUST.stokes_number) for t in (1, 2)
+    )
     np.testing.assert_array_equal(one.velocity, two.velocity)
 
 
