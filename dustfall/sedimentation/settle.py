@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -134,7 +134,8 @@ def settle(
     Parameters
     ----------
     closure : tells the drag on all particles, at each step
-    start : as from `random_start` or `start_from`
+    start : as from `random_start` or `start_from`; of a state that has moved already, places and
+        velocities count: the run begins anew from them, at time zero
     properties : in SI; the motion depends on them through v_s tau / d_p alone
     schedule, output, checkpoint : when, what and where to write
     progress : called with the number of steps done and of all steps
@@ -175,7 +176,7 @@ def settle(
     with _working_folder(checkpoint, output) as folder, _terminated() as terminated:
         frame = frame_type(len(start.position), output.precision)
         state, frames, rows = _resume(folder, settings, closure, frame, series_type(columns))
-        state = state or start
+        state = state or replace(start, steps=0, last_drag=None)
         first, began = state.steps, time.monotonic()
         saved = began
         while True:

@@ -19,9 +19,16 @@ from dustfall.sedimentation import (
     AllParticles,
     BackFlow,
     MovingNeighbours,
+    NearestNeighbours,
+    Output,
     Properties,
+    Schedule,
     box_length,
+    move,
     random_positions,
+    random_start,
+    settle,
+    start_from,
 )
 from dustfall.sedimentation.neighbour_list import REORDERED_EVERY
 from tests.sedimentation.runs import DUST, run
@@ -493,6 +500,26 @@ def test_checkpoint_of_other_settings_is_refused_by_name(tmp_path, change, named
         run(tmp_path, checkpoint=checkpoint, checkpoint_interval=0.0, progress=interrupt_at(3))
     with pytest.raises(ValueError, match=named):
         run(tmp_path, **{"checkpoint": checkpoint} | change)
+
+
+def test_a_state_that_has_moved_already_starts_as_its_places_and_velocities_do(tmp_path):
+    closure, schedule = NearestNeighbours(ROTNE_PRAGER), Schedule(0.1, 1.0, 0.5)
+    moved = random_start(60, 1e-3, seed=3)
+    for _ in range(15):
+        moved = move(moved, closure(moved), 0.1, DUST.stokes_number)
+
+    def stop(done, total):
+        assert done <= total
+
+    for name, start in (
+        ("moved", moved),
+        ("anew", start_from(moved.position, 1e-3, moved.velocity)),
+    ):
+        output = Output(tmp_path / f"{name}.nc", tmp_path / f"{name}.series.nc")
+        settle(closure, start, DUST, schedule, output, progress=stop)
+    for file in ("{}.nc", "{}.series.nc"):
+        here, there = (xr.load_dataset(tmp_path / file.format(name)) for name in ("moved", "anew"))
+        assert here.identical(there)
 
 
 HEAVIER = DUST.with_galileo_multiple(4)
