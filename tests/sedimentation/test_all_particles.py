@@ -194,6 +194,19 @@ def test_a_run_that_was_stopped_ends_with_the_same_bits(tmp_path):
     assert whole == resumed
 
 
+@pytest.mark.parametrize("fluid", ["unsteady", "quasi_steady"])
+def test_a_second_cloud_meets_nothing_of_the_first(fluid):
+    used = AllParticles(DUST, STEP, fluid)
+    taken(random_start(50, 1e-3, seed=7), used, 3)
+    one_more = random_start(50, 1e-3, seed=8)
+    # That has moved, among fewer and farther ones.
+    others = [replace(random_start(n, phi, seed=8), steps=3) for n, phi in ((40, 1e-3), (40, 1e-4))]
+    for start in (one_more, *others):
+        here, there = (taken(start, c, 2) for c in (used, AllParticles(DUST, STEP, fluid)))
+        np.testing.assert_array_equal(here.velocity, there.velocity)
+        np.testing.assert_array_equal(here.position, there.position)
+
+
 def test_conjugate_gradients_solve_what_an_exact_method_solves(monkeypatch):
     rng = np.random.default_rng(9)
     root = rng.normal(size=(12, 12))

@@ -122,9 +122,12 @@ class AllParticles(Closure):
     def __call__(self, state: State) -> Drag:
         """Return the drag that holds for the coming step.
 
-        Raises ValueError for a cube too small for the near field, FloatingPointError where the
-        forces are not found.
+        A state of no steps, or of another cube or number of particles than the last, meets a fluid
+        at rest. Raises ValueError for a cube too small for the near field, FloatingPointError where
+        the forces are not found.
         """
+        if state.steps == 0 or self._knows_another(state):
+            self.remember({})
         splitting = self._splitting or self._begin(state)
         half = self.step / 2
         side = state.box_length
@@ -157,6 +160,13 @@ class AllParticles(Closure):
             "memory_from": 1 / (self.viscosity * splitting.last_wavenumber**2),
         }
         return Drag(np.zeros(len(velocity)), total, whole_step=True)
+
+    def _knows_another(self, state: State) -> bool:
+        """Whether what is remembered is of a cloud of another size."""
+        particles, side = len(state.position), state.box_length
+        return (self._force is not None and len(self._force) != particles) or (
+            self._splitting is not None and self._splitting.side != side
+        )
 
     def _begin(self, state: State) -> Splitting:
         # For the mean density and for the whole run: the waves that are kept are those of its grid.
