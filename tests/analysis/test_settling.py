@@ -62,6 +62,7 @@ def test_the_mean_is_that_of_all_steps_from_the_start_of_the_statistics():
     (row,) = steady_state([series], 50.0).to_dict("records")
     assert row["value"] == pytest.approx(expected, rel=1e-15)
     assert row["low"] < row["value"] < row["high"]
+    assert steady_state([series], np.int64(50)).equals(steady_state([series], 50.0))
     assert (row["model"], row["n"], row["runs"]) == ("idnn", 1000, 1)
 
 
@@ -96,6 +97,14 @@ def test_a_cloud_that_keeps_its_random_start_is_not_steady_however_even_its_mean
     assert status == TOO_SHORT
     assert spacings == pytest.approx(0.02 * 9 * 50 / 37.41, rel=1e-3)
     assert steadiness([window(run(phi=1e-5, variance=0.0))])[0] == STEADY
+
+
+def test_a_cloud_of_one_velocity_is_steady_once_that_no_longer_changes():
+    falling = run(variance=0.0)
+    falling["settling_velocity_mean"] = 1 - np.exp(-falling["time"] / 50)
+    assert steadiness([window(falling)])[0] == DRIFTING
+    falling["settling_velocity_mean"] = 1 - np.exp(-falling["time"])
+    assert steadiness([window(falling)])[0] == STEADY
 
 
 def test_what_is_not_steady_has_a_trend_and_an_end_and_no_average():
