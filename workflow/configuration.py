@@ -357,6 +357,9 @@ def _check_times(section: str, times: dict, unit: str) -> None:
         f"{duration / STEADY_FRAMES:g}, so that {STEADY_FRAMES} frames, which a spectrum needs, "
         f"follow the first within {section}.duration, which is {duration:g}.",
     )
+    _require_multiple(
+        f"{section}.duration", duration, f"{section}.save_every", times["save_every"], unit
+    )
     latest = duration - max(STEADY_FRAMES * times["save_every"], STEADY_STEPS * step)
     _require(
         times["statistics_from"] <= latest,

@@ -44,7 +44,7 @@ def add_arguments(parser) -> None:
     parser.add_argument("--fluid", help="of all_particles: unsteady (default) or quasi_steady")
     for name, default, text in (
         ("step", 0.1, "time step [tau]"),
-        ("duration", 100.0, "time at the end [tau]"),
+        ("duration", 100.0, "time at the end [tau], a multiple of --save-every"),
         ("save-every", 1.0, "time between frames [tau]"),
         ("checkpoint-interval", 60.0, "wall time between checkpoints [s]"),
     ):

@@ -45,8 +45,9 @@ MOST_STEPS = 10**9
 class Schedule:
     """When a run ends, and when it is written down; all in tau.
 
-    Raises ValueError for a step that is not positive, or times that are no multiples of it, or of
-    more than MOST_STEPS.
+    Raises ValueError for a step that is not positive, times that are no multiples of it, or of more
+    than MOST_STEPS, and a duration that is no multiple of `save_interval`: the last frame is the
+    end.
     """
 
     step: float
@@ -64,6 +65,14 @@ class Schedule:
                     f"{name} is {value}: it has to be a multiple of the step, {self.step}, and of "
                     f"at most {MOST_STEPS} steps"
                 )
+        if self.steps % self.save_every:
+            before = self.steps // self.save_every * self.save_interval
+            allowed = [f"{time:.12g}" for time in (before, before + self.save_interval) if time > 0]
+            raise ValueError(
+                f"duration is {self.duration}: it has to be a multiple of save_interval, "
+                f"{self.save_interval}, for the last frame to be the end; allowed next to it "
+                f"{'are' if before else 'is'} {' and '.join(allowed)}"
+            )
 
     @property
     def steps(self) -> int:

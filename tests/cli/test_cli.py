@@ -189,6 +189,7 @@ ERRORS = {
     "settle {0}/c.csv --particles 9 --phi 1e-3 -o {0}/run.nc": "one is needed",
     "settle --particles 9 --phi 2 -o {0}/run.nc": "phi is 2.0: allowed is",
     "settle --particles 9 --phi 1e-3 --step 0.3 -o {0}/run.nc": "multiple of the step",
+    "settle --particles 9 --phi 1e-3 --duration 2.5 -o {0}/run.nc": "multiple of save_interval, 1",
     "settle --particles 9 --phi 1e-3 --diameter 0 -o {0}/run.nc": "diameter is 0.0",
     "settle --particles 9 --phi 1e-3 --fluid unsteady -o {0}/run.nc": "nearest_neighbours has none",
     "settle --particles 9 --phi 1e-3 --closure all_particles --model isolated -o {0}/run.nc":

@@ -568,6 +568,8 @@ def test_foreign_files_in_the_checkpoint_folder_stay(tmp_path):
         ({"step": 0.0}, "step is 0.0"),
         ({"duration": 0.55, "save_interval": 0.1}, "duration is 0.55"),
         ({"save_interval": 0.25}, "save_interval is 0.25"),
+        ({"save_interval": 0.3}, r"multiple of save_interval, 0\.3, .* to it are 1\.8 and 2\.1$"),
+        ({"duration": 0.2}, r"duration is 0\.2: .* save_interval, 0\.5, .* to it is 0\.5$"),
         ({"duration": 1e300}, r"duration is 1e\+300"),
         ({"properties": Properties(diameter=25.0)}, "the Galileo number is 7.*e\\+16"),
         ({"start": "flying"}, "start is 'flying'"),
