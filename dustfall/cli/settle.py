@@ -75,11 +75,12 @@ def run(options) -> None:
     if trajectory.suffix != ".nc":
         raise ValueError(f"{trajectory}: a trajectory has the suffix .nc")
     folder = trajectory.with_suffix(".checkpoint")
-    # A run that was killed while it cleared up has both.
+    whole = FileExistsError(f"{trajectory} is there, and whole: remove it to run anew")
     if trajectory.exists() and not folder.exists():
-        raise FileExistsError(f"{trajectory} is there, and whole: remove it to run anew")
+        raise whole
     from dustfall.progress import Progress
     from dustfall.sedimentation import Checkpoint, Output, Properties, Schedule, settle
+    from dustfall.sedimentation.settle import is_whole
 
     given = {name: getattr(options, name) for name in PROPERTIES}
     properties = Properties(**{name: value for name, value in given.items() if value is not None})
@@ -87,6 +88,10 @@ def run(options) -> None:
     attributes = {"seed": options.seed, "start": options.start or "random"}
     series = trajectory.with_suffix(".series.nc")
     output = Output(trajectory, series, options.precision, options.seed, attributes=attributes)
+    checkpoint = Checkpoint(folder, options.checkpoint_interval)
+    # One that was killed while it cleared up has left the folder.
+    if is_whole(output, checkpoint):
+        raise whole
     with Progress(f"settle {trajectory.name}", "steps") as progress:
         done = settle(
             _closure(options, properties),
@@ -94,7 +99,7 @@ def run(options) -> None:
             properties,
             schedule,
             output,
-            Checkpoint(folder, options.checkpoint_interval),
+            checkpoint,
             progress.report,
         )
     print(

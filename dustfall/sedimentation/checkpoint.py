@@ -68,6 +68,11 @@ def load(folder: Path, settings: dict) -> list[dict]:
     return states
 
 
+def any_state(folder: Path) -> bool:
+    """Whether `folder` holds a state that a run would go on from, be it damaged."""
+    return any((folder / name).is_file() for name in (CURRENT, PREVIOUS))
+
+
 def clear(folder: Path) -> None:
     """Remove the states, also one that was being written when a run was killed."""
     for name in (CURRENT, PREVIOUS):

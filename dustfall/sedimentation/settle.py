@@ -37,6 +37,9 @@ UNITS = (
     "step, duration, save_interval: tau; galileo, stokes_number (v_s tau / d_p): 1"
 )
 
+FRAMES, ROWS = "frames.bin", "series.bin"
+"""Names of the records in the folder of a checkpoint."""
+
 MOST_STEPS = 10**9
 """More steps than any run takes: a million particles take a second for each."""
 
@@ -223,6 +226,33 @@ def settle(
     return {"steps": steps, "seconds": seconds, "steps_per_second": steps / seconds}
 
 
+def is_whole(output: Output, checkpoint: Checkpoint) -> bool:
+    """Whether a run has come to its end: both files are there, and no state to go on from.
+
+    What it left in the checkpoint's folder, where it was killed while it cleared up, is removed.
+
+    Raises ValueError where another run is at work there.
+    """
+    folder = Path(checkpoint.folder)
+    if not (Path(output.trajectory).exists() and Path(output.series).exists()):
+        return False
+    if folder.exists():
+        with _alone_in(folder):
+            if checkpoints.any_state(folder):
+                return False
+            checkpoints.clear(folder)
+            for name in (FRAMES, ROWS):
+                (folder / name).unlink(missing_ok=True)
+        _remove(folder)
+    return True
+
+
+def _remove(folder: Path) -> None:
+    """Remove the folder of a checkpoint, unless someone else's file is in there."""
+    with suppress(OSError):
+        folder.rmdir()
+
+
 def _check_places(state: State) -> None:
     """Raise FloatingPointError where a particle has flown off, or is nowhere."""
     there = np.abs(state.position) <= FARTHEST * state.box_length
@@ -305,14 +335,14 @@ def _resume(folder: Path, settings: dict, closure: Closure, frame: np.dtype, row
             frames, rows = (
                 Records(folder / file, record, int(saved[name]), str(saved[f"{name}_digest"]))
                 for name, file, record in (
-                    ("frames", "frames.bin", frame),
-                    ("rows", "series.bin", row),
+                    ("frames", FRAMES, frame),
+                    ("rows", ROWS, row),
                 )
             )
             break
     else:
         closure.remember({})
-        return None, Records(folder / "frames.bin", frame), Records(folder / "series.bin", row)
+        return None, Records(folder / FRAMES, frame), Records(folder / ROWS, row)
     closure.remember(
         {
             name.removeprefix("closure."): array
@@ -339,8 +369,7 @@ def _working_folder(checkpoint: Checkpoint | None, output: Output) -> Iterator[P
         folder.mkdir(parents=True, exist_ok=True)
         with _alone_in(folder):
             yield folder
-        with suppress(OSError):  # someone else's file in there stays
-            folder.rmdir()
+        _remove(folder)
 
 
 @contextmanager

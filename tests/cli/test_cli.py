@@ -104,6 +104,22 @@ def test_a_run_that_is_whole_is_not_begun_anew(tmp_path, capsys):
     assert "is there, and whole: remove it" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("left", [[], ["frames.bin", "series.bin"], [".nfs0001"]])
+def test_a_run_that_is_whole_but_left_its_folder_is_not_begun_anew(tmp_path, capsys, left):
+    command = "settle --particles 10 --phi 1e-3 --model isolated --duration 1 -o {0}/run.nc"
+    assert run(command, tmp_path) == 0
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    folder = tmp_path / "run.checkpoint"
+    folder.mkdir()
+    for name in left:
+        (folder / name).touch()
+    assert run(f"{command} --diameter 1e-5", tmp_path) == 2
+    assert "is there, and whole: remove it" in capsys.readouterr().err
+    assert before == {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
+    # What is not the run's own stays.
+    assert folder.exists() == (left == [".nfs0001"])
+
+
 def test_a_run_starts_from_a_table_or_from_where_another_ended(tmp_path):
     position = 10.0 * np.argwhere(np.ones((3, 2, 2))) + np.random.default_rng(1).random((12, 3))
     names = "x [d_p],y [d_p],z [d_p]"
