@@ -31,6 +31,11 @@ def checked_numbers(name: str, values) -> np.ndarray:
         raise ValueError(f"{name} must be an array of numbers: {error}") from None
 
 
+def plain(value):
+    """Python's own number in place of a NumPy scalar, which no JSON takes; all else as it is."""
+    return value.item() if isinstance(value, np.generic) else value
+
+
 def checked_positions(centres) -> np.ndarray:
     """Centres as an array (n, 3) [d_p] of spheres that may overlap.
 

@@ -4,6 +4,7 @@ import warnings
 from dataclasses import dataclass, fields, replace
 from math import cbrt, isfinite
 
+from dustfall.spheres import plain
 from dustfall.units import SPHERE_VOLUME
 
 MOST_GALILEO = 1.0
@@ -42,7 +43,8 @@ class Properties:
 
     def __post_init__(self):
         for field in fields(self):
-            value = getattr(self, field.name)
+            value = plain(getattr(self, field.name))
+            object.__setattr__(self, field.name, value)
             if not (isfinite(value) and value > 0):
                 raise ValueError(f"{field.name} is {value}: it has to be positive and finite")
         if self.particle_density <= self.fluid_density:

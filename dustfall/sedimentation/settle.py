@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +29,7 @@ from dustfall.sedimentation.trajectory import (
     write_series,
     write_trajectory,
 )
+from dustfall.spheres import plain
 from dustfall.streams import Purpose, stream
 
 UNITS = (
@@ -58,6 +59,8 @@ class Schedule:
     save_interval: float
 
     def __post_init__(self):
+        for own in fields(self):
+            object.__setattr__(self, own.name, plain(getattr(self, own.name)))
         if not (np.isfinite(self.step) and self.step > 0):
             raise ValueError(f"step is {self.step}: it has to be positive and finite, in tau")
         for name in ("duration", "save_interval"):

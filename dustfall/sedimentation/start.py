@@ -11,7 +11,7 @@ from numba import njit
 from dustfall.sedimentation.neighbours import FARTHEST, sort_by_cell
 from dustfall.sedimentation.state import State, box_length
 from dustfall.sedimentation.trajectory import open_run
-from dustfall.spheres import TOUCH, checked_numbers
+from dustfall.spheres import TOUCH, checked_numbers, plain
 from dustfall.streams import Purpose, stream
 from dustfall.suspension.cube import folded
 from dustfall.tables import Quantity, read_table
@@ -51,7 +51,7 @@ def random_start(
     The places depend on (seed, case) alone. Raises ValueError as `random_positions` and
     `start_from` do.
     """
-    draws = stream(Purpose.START, seed, case)
+    draws, volume_fraction = stream(Purpose.START, seed, case), plain(volume_fraction)
     return start_from(
         random_positions(draws, particles, volume_fraction), volume_fraction, velocity
     )
@@ -63,7 +63,7 @@ def start_from(position, volume_fraction: float, velocity="rest") -> State:
     Raises ValueError for another shape, a value that is missing, not finite or too large, or
     another word.
     """
-    position = checked_numbers("positions", position)
+    position, volume_fraction = checked_numbers("positions", position), plain(volume_fraction)
     if isinstance(velocity, str):
         if velocity not in START_VELOCITY:
             raise ValueError(f"start is {velocity!r}: allowed are {', '.join(START_VELOCITY)}")

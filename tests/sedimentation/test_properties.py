@@ -1,5 +1,6 @@
 import warnings
 
+import numpy as np
 import pytest
 
 from dustfall.forces.formulas import FORMULAS
@@ -50,6 +51,14 @@ def test_galileo_multiple_changes_gravity_alone_by_default():
 def test_impossible_properties_are_refused_by_name(wrong, named):
     with pytest.raises(ValueError, match=named):
         Properties(**wrong)
+
+
+def test_numbers_of_numpy_are_plain_ones():
+    gravity, diameter = np.float32(8.0), np.float32(2.0**-15)
+    given = Properties(gravity=gravity, diameter=diameter)
+    assert given == Properties(gravity=8.0, diameter=2.0**-15)
+    assert all(type(value) is float for value in vars(given).values())
+    assert type(given.with_galileo_multiple(np.float32(2.0)).gravity) is float
 
 
 def test_unknown_way_to_the_galileo_number_is_refused():

@@ -18,6 +18,7 @@ from dustfall.forces.formulas.rotne_prager import MODEL as ROTNE_PRAGER
 from dustfall.sedimentation import (
     AllParticles,
     BackFlow,
+    Checkpoint,
     MovingNeighbours,
     NearestNeighbours,
     Output,
@@ -386,6 +387,33 @@ def test_interrupted_run_goes_on_to_the_same_bits_with_a_model_that_minds_the_or
             )  # fmt: skip
     run(parts, **settings, save_interval=0.1, checkpoint=parts / "checkpoint")
     assert_same_files(parts, whole)
+
+
+@pytest.mark.parametrize(
+    "closure",
+    [
+        lambda number: NearestNeighbours(ISOLATED),
+        lambda number: AllParticles(
+            DUST, number(0.125), shortest_memory=number(0.5), tolerance=number(2.0**-10)
+        ),
+        lambda number: MovingNeighbours(DUST, number(0.125)),
+        lambda number: BackFlow(ISOLATED, number(2.0**-10)),
+    ],
+)
+def test_numbers_of_numpy_are_saved_and_read_as_plain_ones(tmp_path, closure):
+    """In single precision, of which each is a number."""
+    ends = []
+    for number in (float, np.float32):
+        folder, checkpoint = tmp_path / number.__name__, Checkpoint(tmp_path / "checkpoint", 0.0)
+        output = Output(folder / "case.nc", folder / "case.series.nc")
+        start = random_start(60, number(2.0**-10), seed=1)
+        schedule = Schedule(number(0.125), number(1.0), number(0.5))
+        arguments = closure(number), start, DUST, schedule, output, checkpoint
+        with pytest.raises(Interruption):
+            settle(*arguments, progress=interrupt_at(5))
+        settle(*arguments)
+        ends.append(xr.load_dataset(output.series))
+    assert ends[0].identical(ends[1])
 
 
 # Half of the records is less than either state stands on: such a run begins anew.

@@ -23,6 +23,7 @@ from dustfall.columns import Column
 from dustfall.sedimentation.closures.names import ALL_PARTICLES
 from dustfall.sedimentation.properties import Properties
 from dustfall.sedimentation.state import Closure, Drag, State
+from dustfall.spheres import plain
 from dustfall.suspension import PeriodicMobility
 from dustfall.suspension.conjugate_gradients import conjugate_gradients
 from dustfall.suspension.near_field import NearField
@@ -106,12 +107,12 @@ class AllParticles(Closure):
         for name, value in {"step": step, "shortest_memory": shortest_memory}.items():
             if not (np.isfinite(value) and value > 0):
                 raise ValueError(f"{name} is {value}: it has to be positive and finite, in tau")
-        self.step = step
+        self.step = plain(step)
         self.stokes_number = properties.stokes_number
         self.viscosity = properties.stokes_number / properties.galileo
         self.fluid = fluid
-        self.shortest_memory = shortest_memory
-        self.tolerance = tolerance
+        self.shortest_memory = plain(shortest_memory)
+        self.tolerance = plain(tolerance)
         self.threads = threads
         self._splitting: Splitting | None = None
         self._force: np.ndarray | None = None

@@ -25,6 +25,7 @@ from dustfall.sedimentation.closures.nearest_neighbours import (
 from dustfall.sedimentation.neighbours import nearest_neighbours
 from dustfall.sedimentation.start import random_positions
 from dustfall.sedimentation.state import Drag, State, box_length
+from dustfall.spheres import plain
 from dustfall.streams import Purpose, stream
 from dustfall.suspension.batchelor import BATCHELOR_COEFFICIENT
 
@@ -52,7 +53,7 @@ class BackFlow(NearestNeighbours):
         self, model, volume_fraction: float, neighbours: int | None = None, threads: int = 1
     ):
         super().__init__(model, neighbours, threads)
-        self.volume_fraction = volume_fraction
+        self.volume_fraction = volume_fraction = plain(volume_fraction)
         suspension = 1.0 + BATCHELOR_COEFFICIENT * volume_fraction
         self.velocity = random_mean(model, volume_fraction, self.neighbours) - suspension
 

@@ -21,6 +21,7 @@ from dustfall.sedimentation.closures.all_particles import STIFF, STOPPING_STEPS,
 from dustfall.sedimentation.closures.nearest_neighbours import UP, NearestNeighbours
 from dustfall.sedimentation.properties import Properties
 from dustfall.sedimentation.state import Drag, State
+from dustfall.spheres import plain
 from dustfall.suspension.near_field import NearField
 from dustfall.suspension.rotne_prager import free_mobility
 
@@ -66,7 +67,7 @@ class MovingNeighbours(NearestNeighbours):
         super().__init__(load_formula("rotne_prager"), neighbours, threads)
         if not (np.isfinite(step) and step > 0):
             raise ValueError(f"step is {step}: it has to be positive and finite, in tau")
-        self.step = step
+        self.step = plain(step)
         self.stokes_number = properties.stokes_number
         self._measured: dict[str, float] = {}
 
