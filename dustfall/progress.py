@@ -23,21 +23,34 @@ class Progress:
         self.stream = stream or sys.stderr
         self.start = time.monotonic()
         self.last_line = self.start
+        self.first: int | None = None
         self.bar: tqdm | None = None
 
     def report(self, done: int, total: int) -> None:
-        """Note that `done` of `total` items are finished."""
+        """Note that `done` of `total` items are finished.
+
+        Where the first call tells of more than one, these were done before, as in a run that goes
+        on from a checkpoint: rate and time that remains are of the others.
+        """
+        if self.first is None:
+            self.first = done if done > 1 else 0
         if self.stream.isatty():
             if self.bar is None:
-                self.bar = tqdm(total=total, desc=self.label, unit=self.unit, file=self.stream)
+                self.bar = tqdm(
+                    total=total,
+                    initial=self.first,
+                    desc=self.label,
+                    unit=self.unit,
+                    file=self.stream,
+                )
             self.bar.update(done - self.bar.n)
             return
         now = time.monotonic()
         if done < total and now - self.last_line < self.interval:
             return
         self.last_line = now
-        rate = done / max(now - self.start, 1e-9)
-        remaining = (total - done) / rate if rate > 0 else float("inf")
+        rate = (done - self.first) / max(now - self.start, 1e-9)
+        remaining = (total - done) / rate if rate > 0 else float("inf" if done < total else 0)
         print(
             f"{self.label}: {done} of {total} {self.unit}, {rate:.3g} a second, "
             f"{remaining:.0f} s to go",
