@@ -1,6 +1,7 @@
 """Files that are either whole or absent."""
 
 import errno
+import glob
 import os
 import shutil
 import tempfile
@@ -53,5 +54,6 @@ def remove_leftovers(path: str | os.PathLike) -> None:
     """Remove temporary files of `path` that a killed process left; none may be at work on it."""
     path = Path(path)
     # Eight characters are what mkstemp draws.
-    for temporary in path.parent.glob(f".{path.stem}.{8 * '?'}{path.suffix}"):
+    stem, suffix = glob.escape(path.stem), glob.escape(path.suffix)
+    for temporary in path.parent.glob(f".{stem}.{8 * '?'}{suffix}"):
         temporary.unlink()
