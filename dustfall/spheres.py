@@ -70,6 +70,11 @@ def checked_centres(centres, radii=None) -> np.ndarray:
 def checked_scene(centres, radii=None) -> tuple[np.ndarray, np.ndarray]:
     """Centres as `checked_centres` returns them, and their `centre_distances`."""
     centres = checked_positions(centres)
+    return centres, checked_distances(centres, radii)
+
+
+def checked_distances(centres, radii=None) -> np.ndarray:
+    """The `centre_distances` of what `checked_positions` returned; ValueError for an overlap."""
     distance = centre_distances(centres)
     gaps = distance - (CONTACT if radii is None else radii[:, None] + radii)
     if gaps.min() <= 0.0:
@@ -79,7 +84,7 @@ def checked_scene(centres, radii=None) -> tuple[np.ndarray, np.ndarray]:
             f"spheres {i} and {j} overlap or touch: their centres are {distance[i, j]:.6g} d_p "
             f"apart, more than {contact:g} is needed"
         )
-    return centres, distance
+    return distance
 
 
 def checked_radii(radii, n: int) -> np.ndarray:

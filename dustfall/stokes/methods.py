@@ -53,7 +53,8 @@ def fixed_spheres(
     centres, flow, tolerance, radii: as in `forces_on_fixed_spheres`. method: a key of METHODS;
     "multipole" alone takes radii.
     Raises ValueError if shapes are wrong, values are not finite, spheres overlap, or the method is
-    not known. What went wrong in the solve itself is told by the status.
+    not known; of "multipole" MemoryError before more memory is taken than there is. What went wrong
+    in the solve itself is told by the status.
     """
     if method not in METHODS:
         raise ValueError(f"method {method!r}: allowed are {', '.join(METHODS)}")

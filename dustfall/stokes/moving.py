@@ -9,7 +9,6 @@ Every scene is solved on two levels of degrees or more, until what changes betwe
 estimate, is within the tolerance. Lengths of the system are in the largest radius, mu = 1.
 """
 
-import os
 from dataclasses import dataclass
 from functools import cache
 
@@ -26,6 +25,7 @@ from dustfall.spheres import (
 )
 from dustfall.stokes.close_pairs import effective_coupling
 from dustfall.stokes.harmonics import exact_response
+from dustfall.stokes.memory import check_memory
 from dustfall.stokes.moving_plan import MovingPlan, most_amplified, plan_moving
 from dustfall.stokes.multipoles import (
     AXES,
@@ -34,7 +34,7 @@ from dustfall.stokes.multipoles import (
     incoming_flow,
     solve_system,
 )
-from dustfall.stokes.plan import LARGEST_TOLERANCE, SMALLEST_TOLERANCE
+from dustfall.stokes.plan import LARGEST_TOLERANCE, PLAN_BYTES, SMALLEST_TOLERANCE
 from dustfall.stokes.solve import MOST_ITERATIONS, RESIDUAL_SHARE, response_rows
 from dustfall.stokes.translation import MOST_DEGREE, block_sizes, translation_tables
 
@@ -63,9 +63,6 @@ SAFETY = 3.0
 
 FIRST_GOAL = 10.0
 """Residual of the first level, over that of the others."""
-
-PLAN_BYTES = 80
-"""For each of n^2 pairs: distances, slopes, degrees, and what the plan works with."""
 
 ROUNDING = 1e-14
 """Relative residual that no iteration gets below."""
@@ -181,7 +178,7 @@ class _Scene:
 
 def _checked_scene(centres, radii, tolerance) -> _Scene:
     n = len(np.atleast_1d(centres))
-    _check_memory(n, PLAN_BYTES * n**2)
+    check_memory(n, PLAN_BYTES * n**2)
     radii = checked_radii(radii, n)
     centres, distance = checked_scene(centres, radii)
     tolerance = checked_tolerance(tolerance, SMALLEST_TOLERANCE, LARGEST_TOLERANCE)
@@ -293,7 +290,7 @@ def _solved(scene, amplified, response, right, measured, units, scale) -> tuple:
     iterations = 0
     for level in LEVELS:
         plan = _planned(scene, amplified, level)
-        _check_memory(n, _memory(plan))
+        check_memory(n, _memory(plan))
         coupled = _coupled(scene, plan)
         # The first is there to be compared with.
         enough = goal if coarser is not None else FIRST_GOAL * goal
@@ -382,25 +379,3 @@ def _memory(plan: MovingPlan) -> int:
     moments = 3 * np.sum((np.maximum(plan.degrees.max(axis=1), 1) + 1) ** 2)
     krylov = moments * (MOST_ITERATIONS + 20)
     return 8 * int(couplings + krylov) + PLAN_BYTES * plan.degrees.size
-
-
-def _check_memory(n: int, needed: int) -> None:
-    """Raise MemoryError, with both sizes, where that many bytes are more than there are."""
-    there = available_memory()
-    if needed > there:
-        raise MemoryError(
-            f"{n} spheres take {needed / 2**30:.1f} GiB at this tolerance: only "
-            f"{there / 2**30:.1f} GiB of memory are available"
-        )
-
-
-def available_memory() -> int:
-    """Bytes that this machine can still give, its whole memory where it does not tell."""
-    try:
-        with open("/proc/meminfo", encoding="ascii") as lines:
-            for line in lines:
-                if line.startswith("MemAvailable:"):
-                    return 1024 * int(line.split()[1])
-    except OSError:
-        pass
-    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")

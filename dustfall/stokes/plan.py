@@ -5,10 +5,17 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from dustfall.spheres import checked_scene, checked_tolerance
+from dustfall.spheres import checked_distances, checked_positions, checked_tolerance
+from dustfall.stokes.memory import check_memory
 from dustfall.stokes.translation import MOST_DEGREE
 
 SMALLEST_TOLERANCE, LARGEST_TOLERANCE = 1e-8, 0.1
+
+PLAN_BYTES = 80
+"""For each of n^2 pairs: distances, slopes, degrees, and what a plan works with."""
+
+UNASKED = 1000
+"""Spheres whose plan any machine has the memory for: to ask would take a part of their solve."""
 
 NEGLIGIBLE = 1e-16
 """Fields below this are left out of the bound: a million of them are 1e-2 of the smallest
@@ -33,9 +40,12 @@ def plan_scene(centres, tolerance: float = 1e-4) -> Plan:
 
     centres: (n, 3) [d_p]. tolerance: of the force, relative to an isolated sphere's.
     Raises ValueError for a wrong shape, values that are not finite, overlaps, or a tolerance
-    outside [1e-8, 0.1].
+    outside [1e-8, 0.1], and MemoryError before more memory is taken than there is.
     """
-    centres, distance = checked_scene(centres)
+    centres = checked_positions(centres)
+    if len(centres) > UNASKED:
+        check_memory(len(centres), PLAN_BYTES * len(centres) ** 2)
+    distance = checked_distances(centres)
     tolerance = checked_tolerance(tolerance, SMALLEST_TOLERANCE, LARGEST_TOLERANCE)
     return Plan(centres, distance, _choose_degrees(distance, tolerance, MOST_DEGREE))
 

@@ -13,7 +13,8 @@ from dustfall.stokes import (
     mobility,
     resistance,
 )
-from dustfall.stokes.moving import available_memory, needed_memory
+from dustfall.stokes.memory import available_memory
+from dustfall.stokes.moving import needed_memory
 from dustfall.stokes.moving_plan import plan_moving
 from dustfall.stokes.references.fundamental_solutions import reference_loads
 from dustfall.stokes.references.moving_pairs import loads_on_two_spheres
@@ -294,7 +295,7 @@ def test_bad_input_is_refused_in_a_sentence(changes, message):
 
 def test_memory_that_is_not_there_is_not_taken(monkeypatch):
     assert available_memory() > needed_memory(triangle(3.0)) > 2**16
-    monkeypatch.setattr("dustfall.stokes.moving.available_memory", lambda: 2**16)
+    monkeypatch.setattr("dustfall.stokes.memory.available_memory", lambda: 2**16)
     with pytest.raises(MemoryError, match=r"3 spheres take .* GiB .* only 0.0 GiB"):
         mobility(triangle(3.0), np.ones((3, 3)))
 
