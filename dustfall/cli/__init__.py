@@ -54,7 +54,10 @@ def parser() -> Parser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a subcommand; return 0, 2 after an error, told in one sentence, or 130 after Ctrl-C."""
+    """Run a subcommand; return 0, 2 after an error, or 130 where Ctrl-C or SIGTERM ended it.
+
+    Either is told in one sentence.
+    """
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     options = parser().parse_args(arguments)
     options.command = shlex.join(["dustfall", *arguments])
@@ -65,7 +68,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print(f"\ndustfall {options.subcommand}: interrupted", file=sys.stderr)
         return 130
-    except (ArithmeticError, ImportError, OSError, RuntimeError, ValueError) as error:
+    except SystemExit as stop:
+        if not isinstance(stop.code, str):
+            raise
+        # Of a run that has saved its state.
+        print(f"dustfall {options.subcommand}: {stop}", file=sys.stderr)
+        return 130
+    except (
+        ArithmeticError, ImportError, MemoryError, OSError, RuntimeError, ValueError,
+    ) as error:  # fmt: skip
         print(f"dustfall {options.subcommand}: {_sentence(error)}", file=sys.stderr)
         return 2
     return 0

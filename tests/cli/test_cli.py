@@ -242,6 +242,35 @@ def test_an_error_is_one_sentence_that_says_what_is_wrong(tmp_path, capsys, comm
     assert sorted(tmp_path.rglob("*")) == before
 
 
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_run_that_is_stopped_says_so_and_has_the_status_of_an_interruption(
+    tmp_path, capsys, monkeypatch, number
+):
+    def stop(progress, done, total):
+        if done == 7:
+            signal.raise_signal(number)
+
+    monkeypatch.setattr("dustfall.progress.Progress.report", stop)
+    command = "settle --particles 10 --phi 1e-3 --model isolated --duration 2 -o {0}/run.nc"
+    assert run(command, tmp_path) == 130
+    told = capsys.readouterr().err
+    assert re.fullmatch(r"dustfall settle: terminated after step 8 of 20, .*\n", told), told
+
+
+def test_more_spheres_than_the_memory_takes_are_refused_before_any_distance(
+    tmp_path, capsys, monkeypatch
+):
+    def distances(*arguments):
+        raise AssertionError
+
+    monkeypatch.setattr("dustfall.spheres.centre_distances", distances)
+    monkeypatch.setattr("dustfall.stokes.memory.available_memory", lambda: 2**30)
+    np.save(tmp_path / "c.npy", 2.0 * np.argwhere(np.ones((20, 20, 10))))
+    assert run("forces {0}/c.npy", tmp_path) == 2
+    told = r"dustfall forces: 4000 spheres take 1\.2 GiB .*: only 1\.0 GiB of memory .*\n"
+    assert re.fullmatch(told, capsys.readouterr().err)
+
+
 EXAMPLES = [line.strip() for module in SUBCOMMANDS.values() for line in module.EXAMPLES.split("\n")]
 
 
