@@ -1,8 +1,9 @@
+import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
 
-from dustfall.sedimentation import random_positions, start_from
+from dustfall.sedimentation import box_length, random_positions, start_from
 from dustfall.sedimentation.start import read_start
 from tests.sedimentation.runs import run
 
@@ -31,6 +32,19 @@ def test_plain_text_holds_positions_and_perhaps_velocities(tmp_path, columns):
         assert velocities is None
     else:
         np.testing.assert_array_equal(velocities, VELOCITIES)
+
+
+def test_a_trajectory_of_another_program_may_hold_text(tmp_path):
+    side = box_length(40, 1e-3)
+    with netCDF4.Dataset(tmp_path / "other.nc", "w") as file:
+        for name, size in {"frame": None, "atom": 40, "spatial": 3}.items():
+            file.createDimension(name, size)
+        file.createVariable("element", str, ("atom",))[:] = np.full(40, "Si", object)
+        file.createVariable("cell_lengths", "f8", ("frame", "spatial"))[0] = np.full(3, side)
+        file.createVariable("coordinates", "f8", ("frame", "atom", "spatial"))[0] = POSITIONS
+    positions, velocities = read_start(tmp_path / "other.nc", 40, 1e-3)
+    np.testing.assert_array_equal(positions, POSITIONS)
+    assert velocities is None
 
 
 def test_given_velocities_take_the_place_of_the_usual_start(tmp_path):
