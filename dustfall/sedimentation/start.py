@@ -14,7 +14,7 @@ from dustfall.sedimentation.trajectory import open_run
 from dustfall.spheres import TOUCH, checked_numbers, plain
 from dustfall.streams import Purpose, stream
 from dustfall.suspension.cube import folded
-from dustfall.tables import Quantity, read_table
+from dustfall.tables import SUFFIXES, Quantity, read_table
 from dustfall.units import CONTACT
 
 SATURATION = 0.38
@@ -64,12 +64,14 @@ def start_from(position, volume_fraction: float, velocity="rest") -> State:
     another word.
     """
     position, volume_fraction = checked_numbers("positions", position), plain(volume_fraction)
+    if position.ndim == 0:
+        raise ValueError("positions are one number: (n, 3) are needed")
+    number = len(position)
     if isinstance(velocity, str):
         if velocity not in START_VELOCITY:
             raise ValueError(f"start is {velocity!r}: allowed are {', '.join(START_VELOCITY)}")
-        velocity = np.tile([0.0, 0.0, START_VELOCITY[velocity]], (len(position), 1))
+        velocity = np.tile([0.0, 0.0, START_VELOCITY[velocity]], (number, 1))
     velocity = checked_numbers("velocities", velocity)
-    number = len(position) if position.ndim else 0
     farthest = FARTHEST * box_length(number, volume_fraction)
     for name, array, most, unit in (
         ("positions", position, farthest, "d_p"),
@@ -131,10 +133,10 @@ def read_start(path: str | Path, particles: int | None, volume_fraction: float):
     A trajectory follows the AMBER convention, as those of this package do, with coordinates in d_p
     and, where it has them, velocities in v_s; its cube is the one that `particles` and
     `volume_fraction` give; as many particles as there are, if `particles` is None. A table (csv,
-    npy, h5, see `dustfall.tables`) has x, y, z in d_p and, if any, velocity_x, velocity_y,
-    velocity_z in v_s. Any other file is text, one particle a line: x y z, or x y z v_x v_y v_z;
-    what follows a # is a comment. Spheres of a table may not overlap; those of a run have moved as
-    its closure said, which may be into each other.
+    txt, npy, h5, see `dustfall.tables`) has x, y, z in d_p and, if any, velocity_x, velocity_y,
+    velocity_z in v_s. Any other file is text, one particle a line: x y z, or x y z v_x v_y v_z, as
+    a table of text without names; what follows a # is a comment. Spheres of a table may not
+    overlap; those of a run have moved as its closure said, which may be into each other.
 
     Returns
     -------
@@ -151,7 +153,9 @@ def read_start(path: str | Path, particles: int | None, volume_fraction: float):
         raise ValueError(f"{path} is no file: a trajectory (.nc) or a table of text is needed")
     if path.suffix == ".nc":
         positions, velocities = _last_frames(path, particles, volume_fraction)
-    elif path.suffix in (".csv", ".npy", ".h5"):
+    elif path.suffix in SUFFIXES:
+        if path.suffix == ".txt":
+            _check_size(path, particles)
         columns = read_table(path, START_TABLE)
         positions, velocities = columns["position"], columns.get("velocity")
     else:
@@ -168,8 +172,8 @@ def read_start(path: str | Path, particles: int | None, volume_fraction: float):
     return positions, velocities
 
 
-def _table(path: Path, particles: int | None) -> np.ndarray:
-    """A table of 3 or 6 columns."""
+def _check_size(path: Path, particles: int | None) -> None:
+    """Raise ValueError for more text than so many particles need, if their number is known."""
     with open(path, "rb") as file:
         size = file.seek(0, os.SEEK_END)
     if particles is not None and size > LONGEST_LINE * (particles + 100):
@@ -177,6 +181,11 @@ def _table(path: Path, particles: int | None) -> np.ndarray:
             f"{path} has {size} bytes: a table of {particles} particles has at most "
             f"{LONGEST_LINE} a line"
         )
+
+
+def _table(path: Path, particles: int | None) -> np.ndarray:
+    """A table of 3 or 6 columns."""
+    _check_size(path, particles)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # of an empty file
@@ -237,7 +246,7 @@ def _last_frame(path, file, name, units, shape):
 
 
 def _refuse_overlaps(path: Path, position: np.ndarray, length: float) -> None:
-    """Raise ValueError that names the first two lines whose spheres overlap."""
+    """Raise ValueError that names the two particles whose spheres overlap most."""
     wrapped = folded(position, length)
     extent = np.ptp(position, axis=0).max()
     hint = "; in units of a diameter: these look like metres" if extent < 1.0 else ""
@@ -254,7 +263,9 @@ def _refuse_overlaps(path: Path, position: np.ndarray, length: float) -> None:
         distance, nearest = scipy.spatial.cKDTree(wrapped, boxsize=length).query(wrapped, k=2)
     closest = distance[:, 1].argmin()
     if distance[closest, 1] < CONTACT - TOUCH:
-        i, j = sorted((int(rows[closest]), int(nearest[closest, 1])))
+        # Of points in one place the tree lists any first.
+        own = rows[closest]
+        i, j = sorted((int(own), int(nearest[closest][nearest[closest] != own][-1])))
         raise ValueError(
             f"{path}: particles {i} and {j} (counted from 0) overlap, their centres are "
             f"{distance[closest, 1]:.3g} d_p apart: at least {CONTACT:g} is needed{hint}"

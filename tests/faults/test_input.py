@@ -65,7 +65,7 @@ def bad_starts():
         yield "\n".join(" ".join(f"{scale * x:.9g}" for x in row) for row in good)
     for fast in (1e3, 1e30, "nan"):
         yield "\n".join(f"{row} 0 0 {fast}" for row in rows)
-    yield from ("", "\n" * 1000, "# nothing\n", "x y z\n" + "\n".join(rows), "\0" * 100)
+    yield from ("", "\n" * 1000, "# nothing\n", "x y w\n" + "\n".join(rows), "\0" * 100)
 
 
 def test_bad_start_files_are_refused_with_the_name_of_the_file(ledger, tmp_path):

@@ -1,10 +1,13 @@
+import re
+
 import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
 
 from dustfall.sedimentation import box_length, random_positions, start_from
-from dustfall.sedimentation.start import read_start
+from dustfall.sedimentation.start import START_TABLE, read_start
+from dustfall.tables import Quantity, write_table
 from tests.sedimentation.runs import run
 
 POSITIONS = random_positions(np.random.default_rng(1), 40, 1e-3)
@@ -21,9 +24,10 @@ def test_a_run_goes_on_from_the_last_frame_of_another(tmp_path):
     np.testing.assert_array_equal(second.velocities[0], first.velocities[-1])
 
 
+@pytest.mark.parametrize("suffix", ["txt", "dat", "xyz"])
 @pytest.mark.parametrize("columns", [3, 6])
-def test_plain_text_holds_positions_and_perhaps_velocities(tmp_path, columns):
-    path = tmp_path / "start.txt"
+def test_plain_text_holds_positions_and_perhaps_velocities(tmp_path, columns, suffix):
+    path = tmp_path / f"start.{suffix}"
     table = np.hstack([POSITIONS, VELOCITIES])[:, :columns]
     np.savetxt(path, table, header="x y z", fmt="%.17g")
     positions, velocities = read_start(path, 40, 1e-3)
@@ -32,6 +36,38 @@ def test_plain_text_holds_positions_and_perhaps_velocities(tmp_path, columns):
         assert velocities is None
     else:
         np.testing.assert_array_equal(velocities, VELOCITIES)
+
+
+@pytest.mark.parametrize("suffix", ["csv", "txt", "npy", "h5"])
+def test_a_table_that_was_written_is_one_to_start_from(tmp_path, suffix):
+    force = Quantity((3,), "Re_p c_D", "that nobody asks for")
+    quantities = {"position": START_TABLE["position"], "force": force}
+    quantities["velocity"] = START_TABLE["velocity"]
+    path = tmp_path / f"start.{suffix}"
+    values = {"position": POSITIONS, "force": POSITIONS, "velocity": VELOCITIES}
+    write_table(path, quantities, values)
+    positions, velocities = read_start(path, 40, 1e-3)
+    np.testing.assert_array_equal(positions, POSITIONS)
+    np.testing.assert_array_equal(velocities, VELOCITIES)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("x y z\n1 2 three\n4 5 6\n", "could not convert string 'three'"),
+        ("x y z\n1 2 3\n4 5 6\n7 8 9\n", "holds 3 particles: 2 are needed"),
+        ("x [m] y [m] z [m]\n1 2 3\n4 5 6\n", "6 names for 3 columns|is in m"),
+        ("x,y\n1,2\n4,5\n", "no column z among x, y"),
+        ("1 2 3 4\n4 5 6 7\n", "4 columns without names"),
+        (" " * 200_000, "has 200000 bytes: a table of 2 particles has at most"),
+    ],
+)
+def test_text_that_is_no_start_is_refused_by_its_name(tmp_path, content, words):
+    path = tmp_path / "start.txt"
+    path.write_text(content)
+    with pytest.raises(ValueError, match=words) as refusal:
+        read_start(path, 2, 1e-3)
+    assert "start.txt" in str(refusal.value)
 
 
 def test_a_trajectory_of_another_program_may_hold_text(tmp_path):
@@ -54,7 +90,7 @@ def test_given_velocities_take_the_place_of_the_usual_start(tmp_path):
 
 
 def test_files_that_do_not_fit_are_refused_by_name(tmp_path):
-    table = tmp_path / "start.txt"
+    table = tmp_path / "start.dat"
     np.savetxt(table, POSITIONS)
     with pytest.raises(ValueError, match="holds 40 particles: 41 are needed"):
         read_start(table, 41, 1e-3)
@@ -114,6 +150,10 @@ TABLES = {
     "wild": ("1 2 3 0 0 0\n4 5 6 0 0 1e6\n", "velocities at the start hold .* at most 100 v_s"),
     "metres": ("1e-5 2e-4 3e-4\n4e-5 5e-5 6e-4\n", "particles 0 and 1 .*: these look like metres"),
     "overlap": ("1 2 3\n1.5 2 3\n", "particles 0 and 1 .* 0.5 d_p apart: at least 1 is needed"),
+    "twice": (
+        "7 8 9\n1 2 3\n4 5 6\n1 2 3\n",
+        "particles 1 and 3 .*, their centres are 0 d_p apart",
+    ),
     "empty": ("", "holds no particle: 2 are needed"),
     "columns": ("1 2\n3 4\n", "has 2 columns: 3 or 6 are needed"),
     "large": (" " * 200_000, "has 200000 bytes: a table of 2 particles has at most"),
@@ -125,20 +165,22 @@ TABLES = {
 @pytest.mark.parametrize("name", TABLES)
 def test_tables_that_are_no_start_are_refused_with_file_row_and_what_is_allowed(tmp_path, name):
     content, words = TABLES[name]
-    path = tmp_path / f"{name}.txt"
+    path = tmp_path / f"{name}.dat"
     path.write_bytes(content.encode("utf-8", "surrogateescape"))
     with pytest.raises(ValueError, match=words) as refusal:
         # A cube of 12.57 d_p.
-        read_start(path, 2, 5.27e-4)
-    assert f"{name}.txt" in str(refusal.value)
+        read_start(path, 4 if name == "twice" else 2, 5.27e-4)
+    assert f"{name}.dat" in str(refusal.value)
     assert "\n" not in str(refusal.value)
 
 
 def test_many_particles_in_one_place_are_refused_at_once(tmp_path):
     path = tmp_path / "start.txt"
     np.savetxt(path, np.full((100_000, 3), 0.5), fmt="%g")
-    with pytest.raises(ValueError, match="overlap"):
+    with pytest.raises(ValueError, match=r"particles .* overlap") as refusal:
         read_start(path, 100_000, 1e-3)
+    one, other = re.search(r"particles (\d+) and (\d+)", str(refusal.value)).groups()
+    assert one != other
 
 
 def test_a_folder_and_a_device_are_no_start(tmp_path):
@@ -157,6 +199,8 @@ def test_a_folder_and_a_device_are_no_start(tmp_path):
         ({"position": np.ma.masked_greater(POSITIONS, 5)}, "the value at .* is missing"),
         ({"position": 1e20 * POSITIONS}, "positions at the start"),
         ({"position": "here"}, "positions must be an array of numbers"),
+        ({"position": 3.0}, r"positions are one number: \(n, 3\) are needed"),
+        ({"position": 3.0, "velocity": VELOCITIES}, "positions are one number"),
     ],
 )
 def test_starts_that_cannot_be_are_refused_by_name(change, named):
