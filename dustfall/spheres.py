@@ -21,12 +21,15 @@ MOST_RATIO = 1e3
 
 
 def checked_numbers(name: str, values) -> np.ndarray:
-    """An own array of floats; ValueError for words, holes and rows of different lengths."""
+    """An own array of floats, its rows one after the other in memory, as kernels are compiled for.
+
+    Raises ValueError for words, holes and rows of different lengths.
+    """
     if np.ma.is_masked(values):
         hole = np.argwhere(np.ma.getmaskarray(values))[0].tolist()
         raise ValueError(f"{name} must be an array of numbers: the value at {hole} is missing")
     try:
-        return np.array(values, dtype=float)
+        return np.array(values, dtype=float, order="C")
     except (TypeError, ValueError, OverflowError) as error:
         raise ValueError(f"{name} must be an array of numbers: {error}") from None
 

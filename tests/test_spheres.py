@@ -87,6 +87,12 @@ def test_what_is_checked_is_not_changed_by_its_owner_later():
     assert checked_tolerance(np.float32(0.5), 0.0, 1.0) == 0.5
 
 
+def test_arrays_of_any_order_in_memory_meet_the_same_kernels():
+    centres = checked_centres(np.asfortranarray(FAR))
+    assert centres.flags.c_contiguous
+    np.testing.assert_array_equal(centres, FAR)
+
+
 def test_a_direction_has_length_one_and_no_flow_has_none():
     np.testing.assert_allclose(flow_direction((0, -3e99, 4e99)), [0.0, -0.6, 0.8], rtol=1e-15)
     np.testing.assert_array_equal(flow_direction((0, 0, 0)), np.zeros(3))
