@@ -40,7 +40,7 @@ def nearest_neighbours(
     ----------
     position : (n, 3), wrapped into the cube or not
     box_length : side of the cube, in the unit of `position`
-    number : of neighbours, k
+    number : of neighbours, k, an integer of at least 1
 
     Returns
     -------
@@ -49,8 +49,8 @@ def nearest_neighbours(
 
     Raises
     ------
-    ValueError : no more than k particles, wrong shape, positions that are not finite or beyond
-        `FARTHEST` sides, a `box_length` outside `SIDES`.
+    ValueError : k out of range, no more than k particles, wrong shape, positions that are not
+        finite or beyond `FARTHEST` sides, a `box_length` outside `SIDES`.
     """
     position = check_positions(position, box_length, number)
     n = len(position)
@@ -64,7 +64,12 @@ def nearest_neighbours(
 
 def check_positions(position: np.ndarray, box_length: float, number: int) -> np.ndarray:
     """Return `position` as contiguous float64 (n, 3), or raise ValueError by name."""
-    position = np.ascontiguousarray(checked_numbers("positions", position))
+    if not isinstance(number, int | np.integer) or number < 1:
+        raise ValueError(
+            f"the number of neighbours is {number}: it has to be an integer of at least 1, and "
+            "smaller than that of particles"
+        )
+    position = checked_numbers("positions", position)
     if position.ndim != 2 or position.shape[1] != 3:
         raise ValueError(f"positions have shape {position.shape}: (n, 3) is needed")
     if len(position) <= number:

@@ -77,6 +77,11 @@ def test_searches_are_few_where_particles_move_little_against_the_mean():
     assert sum(searched[1:]) < 600
 
 
+def test_a_list_without_a_neighbour_is_refused():
+    with pytest.raises(ValueError, match="number of neighbours is 0"):
+        NeighbourList(60, 20.0, Blocks(60), 0).update(np.random.default_rng(1).random((60, 3)))
+
+
 def test_equal_distances_are_ordered_by_row():
     cube = lattice(3)
     vectors, index = nearest_neighbours(cube, 3.0)

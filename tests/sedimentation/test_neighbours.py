@@ -108,3 +108,9 @@ def test_vectors_do_not_change_under_translation():
 def test_impossible_input_is_refused_by_name(position, side, named):
     with pytest.raises(ValueError, match=named):
         nearest_neighbours(position, side)
+
+
+@pytest.mark.parametrize("number", [0, -1, 2.0, np.float64(2.0), None, "two"])
+def test_a_number_of_neighbours_that_is_none_is_refused(number):
+    with pytest.raises(ValueError, match=r"number of neighbours is .* integer of at least 1"):
+        nearest_neighbours(np.eye(6, 3), 5.0, number)
