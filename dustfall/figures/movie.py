@@ -50,7 +50,7 @@ def save_movie(
     trajectory : coordinates [d_p] and velocities [v_s] (frame, atom, spatial), time (frame) [tau],
         cell_lengths (frame, cell_spatial) [d_p]; attributes n and volume_fraction
     path : of the movie, .gif or .mp4 (H.264), written atomically
-    frames : pictures at most, evenly spaced over the run from the first moving frame on
+    frames : pictures at most, evenly spaced over the run, from its first frame to its last
     milliseconds : that a picture is shown
 
     Raises

@@ -174,7 +174,7 @@ def choose_splitting(
     Parameters
     ----------
     particles, side : n, and the cube's side [d_p]
-    tolerance : relative error of velocities, 1e-10 to 0.1
+    tolerance : relative error of velocities, 1e-8 to 0.1
     crowding : density around a particle over the mean density
     reach : of the pairs [d_p], by default one with which pairs take as long as waves
 
