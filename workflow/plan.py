@@ -1,7 +1,6 @@
 """Which artefacts a configuration asks for, and how they are named."""
 
-import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from functools import cache
 from itertools import chain, repeat
@@ -179,10 +178,7 @@ def training(config: dict, model: str) -> dict:
 
 def compared_models(config: dict) -> list[str]:
     """Force models that clouds settle with beside the campaign's; "formulas" is all of them."""
-    return _compared_models(config["sedimentation"])
-
-
-def _compared_models(settle: dict) -> list[str]:
+    settle = config["sedimentation"]
     formulas = [name for name in settling_models() if name not in trained_models()]
     named = [
         name
@@ -194,41 +190,37 @@ def _compared_models(settle: dict) -> list[str]:
 
 def cases(config: dict) -> Mapping[str, Case]:
     """Every sedimentation case by its name; of the first seed all, then of the next one."""
-    # The plan asks once and again for each of them.
-    return _cases(json.dumps(config["sedimentation"]))
+    settle = config["sedimentation"]
+    galileo, long = settle["galileo"], settle["long"]
+    # The plan asks for each of them again and again.
+    return _cases(
+        tuple(settle["particles"]),
+        tuple(settle["seeds"]),
+        tuple(long["particles"]),
+        tuple(long["seeds"]),
+        tuple(settle["volume_fractions"]),
+        (galileo["particles"], galileo["volume_fraction"], *galileo["multiples"]),
+        (*compared_models(config), *[BACK_FLOW] * settle["back_flow"]),
+        tuple(settle["all_particles"]["particles"]),
+    )
 
 
 @cache
-def _cases(settings: str) -> Mapping[str, Case]:
-    settle = json.loads(settings)
-    galileo = settle["galileo"]
-    long = settle["long"]
-    phis = settle["volume_fractions"]
+def _cases(particles, starts, lasting, lasting_starts, phis, galileo, beside, together):
+    changed, phi_changed, *multiples = galileo
     # Of cases that are compared long ones say more, where there are any.
-    fewest, lasting = min(long["particles"] or settle["particles"]), bool(long["particles"])
+    fewest, long = min(lasting or particles), bool(lasting)
     found = [
-        *(Case(n, phi, 1.0) for n in settle["particles"] for phi in phis),
-        *(
-            Case(galileo["particles"], galileo["volume_fraction"], multiple)
-            for multiple in galileo["multiples"]
-        ),
-        *(Case(n, phi, 1.0, long=True) for n in long["particles"] for phi in phis),
-        *(
-            Case(fewest, phi, 1.0, compared=compared, long=lasting)
-            for compared in [*_compared_models(settle), *[BACK_FLOW] * settle["back_flow"]]
-            for phi in phis
-        ),
-        *(
-            Case(n, phi, 1.0, compared=ALL_PARTICLES)
-            for n in settle["all_particles"]["particles"]
-            for phi in phis
-        ),
+        *(Case(n, phi, 1.0) for n in particles for phi in phis),
+        *(Case(changed, phi_changed, multiple) for multiple in multiples),
+        *(Case(n, phi, 1.0, long=True) for n in lasting for phi in phis),
+        *(Case(fewest, phi, 1.0, compared=other, long=long) for other in beside for phi in phis),
+        *(Case(n, phi, 1.0, compared=ALL_PARTICLES) for n in together for phi in phis),
     ]
-    seeds = _seeds(settle["particles"], settle["seeds"])
-    long_seeds = _seeds(long["particles"], long["seeds"])
+    seeds, long_seeds = _seeds(particles, starts), _seeds(lasting, lasting_starts)
     by_name = {
         case.name: case
-        for seed in range(1, max([*settle["seeds"], *long["seeds"]]) + 1)
+        for seed in range(1, max([*starts, *lasting_starts]) + 1)
         for case in (one._replace(seed=seed) for one in found)
         # Compared long cases have the first start only: they differ from each other by their paths.
         if seed <= (seeds, {} if case.compared else long_seeds)[case.long].get(case.particles, 1)
@@ -236,7 +228,7 @@ def _cases(settings: str) -> Mapping[str, Case]:
     return MappingProxyType(by_name)
 
 
-def _seeds(particles: list[int], numbers: list[int]) -> dict[int, int]:
+def _seeds(particles: Sequence[int], numbers: Sequence[int]) -> dict[int, int]:
     """Starts of each number of particles; the last number of starts is for those that follow."""
     return dict(zip(particles, chain(numbers, repeat(numbers[-1])), strict=False))
 

@@ -97,10 +97,10 @@ def test_a_folder_that_cannot_be_written_is_told(whole, tmp_path, ledger):
     count(ledger, "a folder of results that cannot be written", [outcome])
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_a_campaign_half_deleted_is_made_whole(whole, tmp_path, ledger, seed):
+def test_a_campaign_half_deleted_is_made_whole(whole, tmp_path, ledger):
     project = copy_of(whole, tmp_path)
-    rng = np.random.default_rng(seed)
+    # Of files that nothing asks for, this once took table and checksum.
+    rng = np.random.default_rng(2)
     files = sorted(path for path in (tmp_path / "results").rglob("*") if path.is_file())
     for path in files:
         if rng.random() < 0.5:

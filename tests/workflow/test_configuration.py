@@ -176,6 +176,7 @@ REFUSED = [
     ),
     ("sedimentation.long.step", 1e-9, "is 25 spreading times, but must be at most 1,000,000,000"),
     ("studies.steps", [0.1, 1e-307], "must be at most 1,000,000,000 times one of studies.steps"),
+    (
         "sedimentation.save_every",
         0.3,
         "must be a multiple of sedimentation.save_every, which",

@@ -42,7 +42,8 @@ def test_its_rules_run_with_the_configuration_that_is_handed_in(user):
     assert (made.parent / "checksums/config.yaml.sha256").exists()
     user.run("--cores", "1", "--", "dustfall_verify")
     made.write_text("seed: 8")
-    assert "dust/results/config.yaml is damaged" in user.snakemake("-c1", "--", "dustfall_verify").stdout
+    done = user.snakemake("-c1", "--", "dustfall_verify")
+    assert "dust/results/config.yaml is damaged" in done.stdout
 
 
 def test_all_of_it_is_planned_below_the_prefix(user):
