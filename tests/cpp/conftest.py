@@ -3,6 +3,7 @@
 import ctypes
 import shutil
 import subprocess
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -89,13 +90,24 @@ def compile_with():
     return compile_with
 
 
+@pytest.fixture(scope="session")
+def built(compile_with, tmp_path_factory):
+    """A function that compiles one of the builds, once."""
+
+    @cache
+    def built(build):
+        path = tmp_path_factory.mktemp("library") / "libdustfall.so"
+        source, flags = CPP / "dustfall.cpp", (*BUILDS[build], *STRICT)
+        compile_with("g++", "-std=c++11", *flags, "-fPIC", "-shared", source, "-o", path)
+        return path
+
+    return built
+
+
 @pytest.fixture(scope="session", params=BUILDS)
-def library(request, compile_with, tmp_path_factory):
+def library(request, built):
     """The C interface for any processor, and for this one with its fused products."""
-    path = tmp_path_factory.mktemp("library") / "libdustfall.so"
-    source, flags = CPP / "dustfall.cpp", (*BUILDS[request.param], *STRICT)
-    compile_with("g++", "-std=c++11", *flags, "-fPIC", "-shared", source, "-o", path)
-    return Library(path)
+    return Library(built(request.param))
 
 
 @pytest.fixture(scope="session")
