@@ -22,12 +22,11 @@ INTERRUPTIONS = max(2, KILLS // 10)
 WHILE_PLANNING = 0.25
 """Share of the kills that meet Snakemake before it has planned; an interrupt then stops nothing."""
 
-FILES = 2.0
-"""Files that a campaign makes between its plan and the signal, on average of Poisson's law: some
-stops meet the jobs that it went on with, and a hundred of them go through to its end."""
+LAST = 6
+"""Files at the end of a campaign that no signal waits for; they take longer than `MOMENT`."""
 
 MOMENT = 2.0
-"""The signal comes at most so long after that [s]."""
+"""The signal comes at most so long after as many files as it waits for [s]."""
 
 
 def unlock(project: Project) -> None:
@@ -54,20 +53,17 @@ STOPS = {
 }
 
 
-def start_up(project: Project) -> float:
-    """Seconds that Snakemake needs here until its first job."""
+def planned(project: Project) -> tuple[int, float]:
+    """Number of files that the campaign makes, and seconds that Snakemake plans for until a job."""
     began = time.monotonic()
-    project.dry_run(*SMOKE, "--", *TARGET)
-    return time.monotonic() - began
+    done = project.snakemake(*SMOKE, "--summary", "--", *TARGET)
+    files = [line for line in done.stdout.splitlines() if line.startswith("results/")]
+    return len(files), time.monotonic() - began
 
 
 def files_of(project: Project) -> int:
     """Number of files that the campaign has made."""
     return sum(1 for _ in (project.folder / "results/checksums").rglob("*.sha256"))
-
-
-def has_made(project: Project, number: int) -> bool:
-    return files_of(project) >= number
 
 
 def wait_for(condition: Callable[[], bool], process: subprocess.Popen) -> None:
@@ -77,21 +73,23 @@ def wait_for(condition: Callable[[], bool], process: subprocess.Popen) -> None:
 
 
 def stopped_run(
-    project: Project, number: int, start: float, rng, at_its_end: Callable[[], None]
+    project: Project,
+    number: int,
+    moment: tuple[int, float],
+    while_planning: bool,
+    at_its_end: Callable[[], None],
 ) -> str:
-    """Words of a run that a signal met at a random moment."""
+    """Words of a run that a signal met: so many seconds after it began or after so many files."""
+    files, seconds = moment
     while True:
         process = begin(
             project, "--", *TARGET, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
         )
-        if number == signal.SIGKILL and rng.random() < WHILE_PLANNING:
-            moment = rng.uniform(0, start)
-        else:
+        if not while_planning:
             wait_for(partial(locked, project), process)
-            wait_for(partial(has_made, project, files_of(project) + rng.poisson(FILES)), process)
-            moment = rng.uniform(0, MOMENT)
+            wait_for(lambda: files_of(project) >= files, process)
         try:
-            words, _ = process.communicate(timeout=moment)
+            words, _ = process.communicate(timeout=seconds)
         except subprocess.TimeoutExpired:
             end(process, number)
             words, _ = process.communicate()
@@ -112,11 +110,17 @@ def test_a_campaign_stopped_at_random_moments_says_why_and_ends_with_the_same_bi
         # Asked for as late as this, the undisturbed campaign may run in another process meanwhile.
         whole = request.getfixturevalue("whole")
         outcomes.append("silent" if difference(project, whole) else "healed")
+        assert files_of(project) == made
 
-    start = start_up(project)
+    made, start = planned(project)
     kills, interruptions = [signal.SIGKILL] * KILLS, [signal.SIGINT, signal.SIGTERM] * INTERRUPTIONS
-    for number in rng.permutation(kills + interruptions):
-        words = stopped_run(project, number, start, rng, compare)
+    numbers = rng.permutation(kills + interruptions)
+    # In order, the stops go through to the campaign's end once.
+    moments = np.sort(rng.integers(max(1, made - LAST), size=len(numbers)))
+    for number, files in zip(numbers, moments, strict=True):
+        while_planning = number == signal.SIGKILL and rng.random() < WHILE_PLANNING
+        moment = files, rng.uniform(0, start if while_planning else MOMENT)
+        words = stopped_run(project, number, moment, while_planning, compare)
         if number == signal.SIGKILL:
             unlock(project)
         else:

@@ -120,7 +120,7 @@ def test_a_campaign_half_deleted_is_made_whole(whole, tmp_path, ledger):
 
 
 def test_of_two_runs_at_once_one_is_refused_and_the_other_ends(whole, tmp_path, ledger):
-    project, target = Project(tmp_path), "results/model/evaluation.csv"
+    project, target = Project(tmp_path), "results/dataset/forces.h5"
     first = begin(project, "--", target)
     while not locked(project):
         time.sleep(0.1)
