@@ -191,8 +191,7 @@ def compared_models(config: dict) -> list[str]:
 def cases(config: dict) -> Mapping[str, Case]:
     """Every sedimentation case by its name; of the first seed all, then of the next one."""
     settle = config["sedimentation"]
-    galileo = settle["galileo"]
-    long = settle["long"]
+    galileo, long = settle["galileo"], settle["long"]
     # The plan asks for each of them again and again.
     return _cases(
         tuple(settle["particles"]),

@@ -88,6 +88,8 @@ def _looked_up(
         case ast.Assign([ast.Name(name)], value) if (key := _section(value, sections)) is not None:
             sections[name] = key
             return
+        case ast.Assign([ast.Tuple(targets)], ast.Tuple(values)) if len(targets) == len(values):
+            parts = [ast.Assign([one], value) for one, value in zip(targets, values, strict=True)]
         case ast.Name(name) | ast.Attribute(ast.Name("plan"), name) if name in names:
             yield from _looked_up(names[name], names)
             return

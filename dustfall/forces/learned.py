@@ -246,8 +246,8 @@ def _network(tensors, header, component):
 
     def tensor(name, *shape):
         array = tensors[f"{component}.{name}"]
-        if array.shape != shape or array.dtype not in (np.float32, np.float64):
-            raise ValueError(f"{component}.{name} is {array.dtype}{array.shape}, not {shape}")
+        if array.shape != shape:
+            raise ValueError(f"{component}.{name} has the shape {array.shape}, not {shape}")
         if not np.isfinite(array).all():
             raise ValueError(f"{component}.{name} holds a value that is not finite")
         return array

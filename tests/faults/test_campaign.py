@@ -6,7 +6,6 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -54,10 +53,10 @@ STOPS = {
 
 
 def planned(project: Project) -> tuple[int, float]:
-    """Number of files that the campaign makes, and seconds that Snakemake plans for until a job."""
+    """Number of files that the campaign makes, and seconds that Snakemake takes to plan them."""
     began = time.monotonic()
-    done = project.snakemake(*SMOKE, "--summary", "--", *TARGET)
-    files = [line for line in done.stdout.splitlines() if line.startswith("results/")]
+    lines = project.run(*SMOKE, "--summary", "--", *TARGET).splitlines()
+    files = [line for line in lines if line.startswith("results/")]
     return len(files), time.monotonic() - began
 
 
@@ -75,19 +74,17 @@ def wait_for(condition: Callable[[], bool], process: subprocess.Popen) -> None:
 def stopped_run(
     project: Project,
     number: int,
-    moment: tuple[int, float],
-    while_planning: bool,
+    files: int | None,
+    seconds: float,
     at_its_end: Callable[[], None],
 ) -> str:
-    """Words of a run that a signal met: so many seconds after it began or after so many files."""
-    files, seconds = moment
+    """Words of a run that a signal met, `seconds` after it began or had made so many files."""
     while True:
         process = begin(
             project, "--", *TARGET, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
         )
-        if not while_planning:
-            wait_for(partial(locked, project), process)
-            wait_for(lambda: files_of(project) >= files, process)
+        if files is not None:
+            wait_for(lambda: locked(project) and files_of(project) >= files, process)
         try:
             words, _ = process.communicate(timeout=seconds)
         except subprocess.TimeoutExpired:
@@ -118,9 +115,10 @@ def test_a_campaign_stopped_at_random_moments_says_why_and_ends_with_the_same_bi
     # In order, the stops go through to the campaign's end once.
     moments = np.sort(rng.integers(max(1, made - LAST), size=len(numbers)))
     for number, files in zip(numbers, moments, strict=True):
-        while_planning = number == signal.SIGKILL and rng.random() < WHILE_PLANNING
-        moment = files, rng.uniform(0, start if while_planning else MOMENT)
-        words = stopped_run(project, number, moment, while_planning, compare)
+        if number == signal.SIGKILL and rng.random() < WHILE_PLANNING:
+            words = stopped_run(project, number, None, rng.uniform(0, start), compare)
+        else:
+            words = stopped_run(project, number, files, rng.uniform(0, MOMENT), compare)
         if number == signal.SIGKILL:
             unlock(project)
         else:

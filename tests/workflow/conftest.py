@@ -53,14 +53,14 @@ class Project:
             text=True,
         )
 
-    def run(self, *arguments: str) -> None:
+    def run(self, *arguments: str) -> str:
         done = self.snakemake(*arguments)
-        assert done.returncode == 0, done.stdout + done.stderr
+        words = done.stdout + done.stderr
+        assert done.returncode == 0, words
+        return words
 
     def dry_run(self, *arguments: str) -> str:
-        done = self.snakemake("--dry-run", *arguments)
-        assert done.returncode == 0, done.stdout + done.stderr
-        return done.stdout + done.stderr
+        return self.run("--dry-run", *arguments)
 
     def plan(self, *arguments: str) -> dict[str, int]:
         """Jobs that a dry run announces, by rule; the target rule `all` is left out."""

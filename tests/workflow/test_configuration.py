@@ -73,7 +73,7 @@ def test_rules_read_every_key_and_no_other():
     ("key", "rules"),
     [
         # In a parameter; through a constant of the rules; through functions of the plan; where a
-        # function names a section; in a resource.
+        # function names a section, or two at once; in a resource.
         ("studies.together", ["step_size"]),
         ("idnn.layers", ["plan", "winner"]),
         ("idnn.training_of.anchored.epochs", ["model", "trial"]),
@@ -90,6 +90,10 @@ def test_rules_read_every_key_and_no_other():
                 "study_of_moving_neighbours",
                 "study_of_neighbours",
             ],
+        ),
+        (
+            "sedimentation.long.step",
+            ["sedimentation", "study_of_moving_neighbours", "study_of_neighbours"],
         ),
     ],
 )
